@@ -43,7 +43,7 @@ def measure() -> list[Row]:
     live = part.live_of(machine)
     size = sum(
         len(text.encode())
-        for text in (live.kernel, live.setting, live.worker, part.script(), part.style())
+        for text in (live.kernel, live.setting, live.worker, live.script, live.style)
     )
     with tempfile.TemporaryDirectory() as name:
         file = Path(name) / "live.html"

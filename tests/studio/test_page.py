@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 from collections.abc import Iterator
 from typing import Any
@@ -103,7 +104,9 @@ def test_a_page_of_another_site_gets_nothing(browser: Any, studio: ServedStudio)
 def test_a_machine_without_a_live_part_has_a_page_that_says_so() -> None:
     machine = tp.load(MACHINES / "planar_two_slider.toml", ["workspace.grid.x=[9000, 9100, 3]"])
     page = studio_page(machine, "127.0.0.1:8768")
-    assert "This page has no live part:" in page.text
-    assert 'id="live-kernel"' not in page.text
+    setting = page.text.partition('id="live-setting">')[2].partition("</script>")[0]
+    told = json.loads(setting)
+    assert told["bundle"] is None
+    assert told["why"]
     assert "connect-src 'self' ws://127.0.0.1:8768" in page.policy
     assert machine.name in page.text

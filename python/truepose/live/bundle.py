@@ -15,7 +15,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
-from truepose.files.shown_units import ICE_POINT, Shown, ShownUnits, shown_units
+from truepose.files.shown_units import ICE_POINT, Shown, shown_units
 from truepose.live.laws import LiveLaw, live_law, weight
 from truepose.live.unknown import correlated_student, unknown, yields_unsaid
 from truepose.machine import Machine
@@ -90,7 +90,7 @@ def bundle(machine: Machine) -> dict[str, Any]:
             "poses": len(poses),
         },
         "target": _target(machine),
-        "units": _units(shown_units(machine.file_units)),
+        "units": units_for_people(machine),
     }
 
 
@@ -229,8 +229,9 @@ def _target(machine: Machine) -> dict[str, float]:
     }
 
 
-def _units(shown: ShownUnits) -> dict[str, dict[str, float | str]]:
+def units_for_people(machine: Machine) -> dict[str, dict[str, float | str]]:
     """By dimension: a label, and SI of one unit; a temperature's `offset` is K at its zero."""
+    shown = shown_units(machine.file_units)
 
     def unit(of: Shown) -> dict[str, float | str]:
         return {"label": of.label, "si": 1.0 / of.per_si}
@@ -260,4 +261,4 @@ def _plain(value: object) -> Any:
     return value
 
 
-__all__ = ["SCHEMA", "bundle", "middle_pose"]
+__all__ = ["SCHEMA", "bundle", "middle_pose", "units_for_people"]

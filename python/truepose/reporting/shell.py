@@ -26,8 +26,6 @@ from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._json import as_json
 from truepose.reporting.figures._style import AXIS, DARK, GRID, INK, PAPER, SCENE_GRID
 from truepose.reporting.live.part import LivePart
-from truepose.reporting.live.part import script as live_script
-from truepose.reporting.live.part import style as live_style
 from truepose.reporting.result_words import verdict_of
 from truepose.reporting.table import Table
 from truepose.version import version
@@ -148,12 +146,12 @@ def page_parts(title: str, live: LivePart | None = None, *, figures: bool = True
     `live`: its live part, if it has one; without `figures` it has neither plotly.js nor what that
     draws of.
     """
-    loader = (live_script() if live else "") + (_together(DRAWING) if figures else "")
+    loader = (live.script if live else "") + (_together(DRAWING) if figures else "")
     return {
         "title": title,
         "language": spoken().code,
         "version": version(),
-        "css": _together(["page.css", "page_one.css"]) + (live_style() if live else ""),
+        "css": _together(["page.css", "page_one.css"]) + (live.style if live else ""),
         "live": live,
         "loader": loader,
         "policy": policy(loader, live=live is not None, beside=bool(live and live.beside)),

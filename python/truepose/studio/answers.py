@@ -19,8 +19,7 @@ from truepose.error_budget.evaluate import evaluate
 from truepose.errors import RequestError
 from truepose.live.bundle import bundle, middle_pose
 from truepose.machine import Condition, Machine
-from truepose.reporting.figures._outline import is_planar
-from truepose.reporting.live.part import drawing
+from truepose.reporting.live.part import machine_in_page
 from truepose.runs.poses import Progress
 from truepose.runs.quantities import quantities
 from truepose.studio.settings import Settings
@@ -140,12 +139,7 @@ def known(question: Question) -> dict[str, Any]:
 def machine_of_page(question: Question) -> dict[str, Any]:
     """What the page needs to answer by itself. Raises as `truepose.live.bundle`."""
     machine = question.machine
-    data = bundle(machine)
-    return {
-        "bundle": data,
-        "drawing": drawing(machine, data["workspace"]["home"]),
-        "planar": is_planar(machine),
-    }
+    return machine_in_page(machine, bundle(machine))
 
 
 def verdict(question: Question) -> Iterator[list[dict[str, Any]]]:

@@ -195,3 +195,25 @@ function asInTheFile(bundle) {
     scale: {half_width: Object.fromEntries([...groups].map(group => [group, 1])), compliance: 1},
   };
 }
+
+// The same with another pose and another condition, each null where it is the file's, as far as this
+// machine has them.
+function shownOf(bundle, {pose, condition}) {
+  const state = asInTheFile(bundle);
+  if (pose && pose.length === state.pose.length) state.pose = [...pose];
+  if (condition) {
+    for (const part in state.condition.temperature) {
+      if (part in condition.temperature) state.condition.temperature[part] = condition.temperature[part];
+    }
+    state.condition.wrench = [...condition.wrench];
+  }
+  return state;
+}
+
+// Factors of another state, of groups that there still are.
+function keepFactors(state, {scale}) {
+  for (const group in state.scale.half_width) {
+    if (group in scale.half_width) state.scale.half_width[group] = scale.half_width[group];
+  }
+  state.scale.compliance = scale.compliance;
+}

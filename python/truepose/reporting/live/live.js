@@ -1,15 +1,17 @@
 // The live part of a page: a state that sliders change, what the kernel says of it at once, and what a
-// worker finds after that. When it is drawn for the first time the root has `data-live-ready`.
+// worker finds after that.
 
 const COMMAND_OF = {before: "nominal", after: "corrected"};
 const STATE_OF = {nominal: "before", corrected: "after"};
 // After so many milliseconds without a step the map is drawn finely.
 const REST = 140;
 
-function livePart(place, setting, ask, module) {
-  const {bundle, drawing, words, scale: colours, worker: script} = setting;
+// `engine` has the kernel, here and in a worker. `moved` is told the state whenever somebody moves it,
+// and null when it is put back; `before` is what `end` gave of the part whose place this one takes.
+function livePart(place, setting, {ask, worker}, {moved = () => {}, before = null} = {}) {
+  const {bundle, drawing, words, scale: colours} = setting;
   const {target} = bundle;
-  const sources = bundle.sources.map(source => ({...source, ...words.sources[source.name]}));
+  const sources = bundle.sources.map(source => ({...source, ...setting.sources[source.name]}));
   const numbers = numbersOf({units: bundle.units, marks: setting.marks});
   const made = ask({op: "machine", bundle});
   const {machine, components, commanded} = made;
@@ -19,7 +21,9 @@ function livePart(place, setting, ask, module) {
   const find = name => place.querySelector(`[data-live="${name}"]`);
 
   const state = asInTheFile(bundle);
-  let quantity = quantities[0], job = 0, steps = 0, asked = false, rest = null;
+  if (before) keepFactors(state, before.state);
+  let quantity = before && quantities.includes(before.quantity) ? before.quantity : quantities[0];
+  let job = before ? before.job : 0, asked = false, rest = null;
   // What is known of the state shown: `errors` and `status` by state at once, the rest by and by.
   let known = null;
 
@@ -37,19 +41,16 @@ function livePart(place, setting, ask, module) {
   const reaches = reachesOf({bundle, machine, components, quantities, ask});
   const view = machineView(find("machine"), {
     drawing, planar: setting.planar, box: edgesOf(bundle.workspace, commanded),
-    grouped: factor => numbers.fixed(factor, factor < 10 ? 1 : 0),
+    grouped: factor => numbers.fixed(factor, factor < 10 ? 1 : 0), before: before && before.view,
   });
   const limits = controls.ranges.slice(0, commanded.length).map(({low, high}) => [low, high]);
   const map = mapView(find("map"), {
     scale: colours, ask, limits, pose: () => state.pose, workspace: bundle.workspace, numbers,
-    commanded, words, moved: () => { controls.show(); changed(); },
+    commanded, words, moved: () => { controls.show(); changed(); }, before: before && before.map,
   });
   const distribution = distributionView(find("distribution"), {numbers, words});
 
-  // A worker that is told of every step, and drops what it had.
-  const address = URL.createObjectURL(new Blob([script], {type: "text/javascript"}));
-  const worker = new Worker(address);
-  worker.postMessage({module, bundle});
+  worker.postMessage({bundle});
   worker.onmessage = ({data}) => {
     if (data.id !== job || !known) return;
     if (data.failed) known.failed = data.failed;
@@ -59,15 +60,17 @@ function livePart(place, setting, ask, module) {
   worker.onerror = event => { if (known) { known.failed = event.message; told(); } };
 
   function changed() {
+    moved(state);
     clearTimeout(rest);
     if (asked) return;
     asked = true;
-    requestAnimationFrame(() => { asked = false; update(true); });
+    requestAnimationFrame(() => { if (asked) update(true); });
   }
 
   // Everything of the state, the map coarser while it is `moving`.
   function update(moving) {
     const begun = performance.now();
+    asked = false;
     const at = {machine, condition: state.condition, scale: state.scale};
     const {status, centres, placements} = ask({op: "place", machine, poses: [state.pose]});
     // What of a state comes later: `worst`, `bounds`, `samples`, and whether these are `done`.
@@ -107,7 +110,7 @@ function livePart(place, setting, ask, module) {
       probabilities: PROBABILITIES, nothing: status[0] !== "ok",
     });
     place.dataset.step = performance.now() - begun;
-    place.dataset.steps = ++steps;
+    place.dataset.steps = 1 + Number(place.dataset.steps || 0);
     clearTimeout(rest);
     if (moving) rest = setTimeout(() => { map.update({...at, components, quantity}, false); legend(); }, REST);
   }
@@ -200,6 +203,7 @@ function livePart(place, setting, ask, module) {
     const quantitySelect = find("quantity");
     quantitySelect.append(...quantities.map(
       name => element("option", {value: name}, words.quantities[name])));
+    quantitySelect.value = quantity;
     quantitySelect.closest("label").hidden = quantities.length < 2;
     quantitySelect.addEventListener("change", () => {
       quantity = quantitySelect.value;
@@ -207,6 +211,7 @@ function livePart(place, setting, ask, module) {
     });
     find("fit").addEventListener("click", () => { map.fit(); legend(); });
     find("reset").addEventListener("click", () => {
+      moved(null);
       Object.assign(state, asInTheFile(bundle));
       controls.show();
       update(false);
@@ -229,35 +234,26 @@ function livePart(place, setting, ask, module) {
   }));
   choices();
   controls.show();
-  new ResizeObserver(drawAll).observe(place);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
-  return {update};
-}
+  const size = new ResizeObserver(drawAll), dark = matchMedia("(prefers-color-scheme: dark)");
+  size.observe(place);
+  dark.addEventListener("change", drawAll);
 
-async function startLive() {
-  const root = document.documentElement, place = document.getElementById("live");
-  if (!place || !place.querySelector(".live-body") || location.hash === "#print") return;
-  try {
-    if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
-      root.dataset.liveReady = "absent";
-      return;
-    }
-    const text = id => document.getElementById(id).textContent;
-    const setting = JSON.parse(text("live-setting"));
-    let module;
-    try {
-      module = await compiledModule(text("live-kernel"));
-    } catch (failure) {
-      root.dataset.liveReady = "absent";  // a browser without simd does not compile it
-      return;
-    }
-    setting.worker = text("live-worker");
-    const part = livePart(place, setting, await kernelOf(module), module);
-    part.update(true);
-    place.dataset.ready = performance.now();
-    root.dataset.liveReady = "drawn";
-  } catch (failure) {
-    root.dataset.liveReady = "failed";
-    console.error(failure);
+  // Shows a pose and a condition, each null where it is the file's, and tells nobody.
+  function show(shown, moving = false) {
+    Object.assign(state, shownOf(bundle, shown), {scale: state.scale});
+    controls.show();
+    update(moving);
   }
+
+  // Nothing of it runs any more; what the next part, of another machine, is to look like.
+  function end() {
+    clearTimeout(rest);
+    asked = false;
+    size.disconnect();
+    dark.removeEventListener("change", drawAll);
+    ask({op: "free", machine});
+    return {state, quantity, job, view: view.kept(), map: map.kept()};
+  }
+
+  return {update, show, end, numbers, get state() { return state; }};
 }

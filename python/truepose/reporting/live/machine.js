@@ -7,10 +7,11 @@ const FILLED = 0.43;
 // How large the largest error drawn may be and is at least, of the picture's radius.
 const SHOWN_LEAST = 0.05, SHOWN_BEST = 0.22, SHOWN_MOST = 0.5;
 
-function machineView(canvas, {drawing, planar, box, grouped}) {
+// `before`: what `kept` gave of the view of another machine, to be looked at in the same way.
+function machineView(canvas, {drawing, planar, box, grouped, before}) {
   const plane = canvasOf(canvas);
-  const turn = {...TURN};
-  let shown = null, magnification = null;
+  const {turn, magnification: magnified} = before || {turn: {...TURN}, magnification: null};
+  let shown = null, magnification = magnified;
   const {middle, radius, wide, high} = extentOf([
     ...drawing.paths.flat(), ...drawing.frame, ...drawing.points, ...box.flat(),
   ]);
@@ -130,6 +131,7 @@ function machineView(canvas, {drawing, planar, box, grouped}) {
 
   return {
     draw,
+    kept: () => ({turn, magnification}),
     // `largest`: the longest error that is to be seen, m; returns how many times it is magnified.
     show(picture, largest) {
       shown = picture;

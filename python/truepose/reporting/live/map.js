@@ -3,9 +3,13 @@
 const FINE = [45, 33], COARSE = [15, 11];
 const EDGE = {left: 46, right: 10, top: 8, bottom: 34};
 
-function mapView(canvas, {scale, ask, limits, pose, workspace, numbers, commanded, words, moved}) {
+// `before`: what `kept` gave of the map of another machine, to be over the same and in its colours.
+function mapView(canvas, {
+  scale, ask, limits, pose, workspace, numbers, commanded, words, moved, before,
+}) {
   const plane = canvasOf(canvas);
-  let axes = [0, 1], ends = null, shown = null;
+  const same = before && before.of.join() === commanded.join();
+  let axes = same ? before.axes : [0, 1], ends = same ? before.ends : null, shown = null;
 
   // Evaluate and draw; `coarse` while something is dragged.
   function update({machine, condition, scale: factors, components, quantity}, coarse) {
@@ -142,6 +146,7 @@ function mapView(canvas, {scale, ask, limits, pose, workspace, numbers, commande
   return {
     update, draw, legend,
     fit() { fit(); draw(); },
+    kept: () => ({axes, ends, of: commanded}),
     over(first, second) { axes = [first, second]; ends = null; },
     get axes() { return axes; },
   };

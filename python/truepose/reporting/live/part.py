@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -21,8 +21,6 @@ from truepose.reporting.figures._style import COLOUR_SCALE
 from truepose.reporting.live.labels import labels, sources_said
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from truepose.machine import Machine
 
 KERNEL = "_kernel.wasm.gz"
@@ -33,14 +31,15 @@ WORKER = (*SHARED, "worker.js")
 PAGE = (
     *SHARED,
     "numbers.js", "controls.js", "canvas.js", "machine.js", "map.js", "distribution.js",
-    "verdict.js", "cards.js", "ranking.js", "live.js",
+    "verdict.js", "cards.js", "ranking.js", "live.js", "start.js",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class LivePart:
-    """What stands in a page: the kernel in base85, a setting as JSON, and the worker's script.
+    """What stands in a page: the kernel in base85, a setting as JSON, and scripts.
 
+    `script`: what the page runs, `worker`: what its worker does; `style`: what it looks like.
     `beside`: the address of a script that brings the kernel, which several pages share; the page
     then has none of its own.
     """
@@ -50,6 +49,8 @@ class LivePart:
     setting: str
     worker: str
     planar: bool
+    script: str
+    style: str
 
 
 def kernel_file() -> Traversable:
@@ -119,28 +120,56 @@ def live_part(machine: Machine, bundle: Mapping[str, Any], beside: str | None = 
 
     Raises `RequestError` (no-live-kernel).
     """
-    language = spoken()
-    colours = [str(colour) for _, colour in COLOUR_SCALE]
-    setting = {
+    kernel = packed_kernel() if beside is None else ""
+    return assembled(kernel, machine_in_page(machine, bundle), beside=beside)
+
+
+def machine_in_page(machine: Machine, bundle: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a page's setting follows from the machine."""
+    return {
         "bundle": bundle,
         "drawing": drawing(machine, bundle["workspace"]["home"]),
         "planar": is_planar(machine),
-        "words": {**labels(), "sources": sources_said(bundle["sources"])},
+        "sources": sources_said(bundle["sources"]),
+    }
+
+
+def assembled(
+    kernel: str,
+    setting: Mapping[str, Any],
+    more: str = "",
+    start: str = "startLive",
+    css: str = "",
+    beside: str | None = None,
+) -> LivePart:
+    """A live part with a setting, which has words, marks and colours besides.
+
+    `more`: a script behind the live one, and `css` behind its style; `start` is called at the end.
+    `beside`: as a `LivePart` has it.
+    """
+    language = spoken()
+    colours = [str(colour) for _, colour in COLOUR_SCALE]
+    whole = {
+        **setting,
+        "words": labels(),
         "marks": {"decimal": language.decimal_mark, "group": language.group_mark},
         "scale": [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in colours],
     }
-    kernel = packed_kernel() if beside is None else ""
-    return LivePart(kernel, beside, as_json(setting), _together(WORKER), is_planar(machine))
+    return LivePart(
+        kernel,
+        beside,
+        as_json(whole),
+        _together(WORKER),
+        bool(setting.get("planar", False)),
+        script(more, start),
+        _together(["live.css"]) + css,
+    )
 
 
-def script() -> str:
+def script(more: str = "", start: str = "startLive") -> str:
     """What the page runs. It says by `liveStarted`, a promise, when it is through."""
-    return f"const liveStarted = (() => {{\n{_together(PAGE)}\nreturn startLive();\n}})();\n"
-
-
-def style() -> str:
-    """What the live part looks like."""
-    return _together(["live.css"])
+    whole = "\n".join(part for part in (_together(PAGE), more) if part)
+    return f"const liveStarted = (() => {{\n{whole}\nreturn {start}();\n}})();\n"
 
 
 def drawing(machine: Machine, home: Sequence[float]) -> dict[str, Any]:
@@ -183,20 +212,26 @@ def _script(name: str) -> str:
 
 
 def _together(names: Iterable[str]) -> str:
+    return plain_text(_script(name) for name in names)
+
+
+def plain_text(texts: Iterable[str]) -> str:
     """Scripts or styles one after the other, without indentation and lines of comments."""
-    lines = (line.strip() for name in names for line in _script(name).splitlines())
+    lines = (line.strip() for text in texts for line in text.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 __all__ = [
     "LivePart",
+    "assembled",
     "drawing",
     "is_built",
     "live_of",
     "live_or_why_not",
     "live_part",
+    "machine_in_page",
     "packed_kernel",
+    "plain_text",
     "script",
     "shared_kernel",
-    "style",
 ]

@@ -6,17 +6,14 @@ const PARTS = [500, 1500, 8000, 40000];
 const LARGEST_PART = 50000, SAMPLES = 500000;
 const SEED = 0;
 
-let ask, machine, latest = null, working = false;
+let ask, machine, bundle = null, latest = null, working = false;
 
 const pause = () => new Promise(done => setTimeout(done));
 
 onmessage = async ({data}) => {
-  if (data.module) {
-    ask = await kernelOf(data.module);
-    ({machine} = ask({op: "machine", bundle: data.bundle}));
-  } else {
-    latest = data;
-  }
+  if (data.module) ask = await kernelOf(data.module);
+  else if (data.bundle) [bundle, latest] = [data.bundle, null];
+  else latest = data;
   if (ask && latest && !working) work();
 };
 
@@ -27,10 +24,11 @@ async function work() {
     latest = null;
     const runs = [];
     try {
+      takeMachine();
       for (const told of steps(job, runs)) {
         postMessage({id: job.id, ...told});
         await pause();
-        if (latest) break;
+        if (latest || bundle) break;
       }
     } catch (failure) {
       postMessage({id: job.id, failed: failure.message});
@@ -38,6 +36,14 @@ async function work() {
     for (const run of runs) ask({op: "free", run});
   }
   working = false;
+}
+
+// The machine of the bundle that was told last, in place of the one before.
+function takeMachine() {
+  if (!bundle) return;
+  if (machine !== undefined) ask({op: "free", machine});
+  ({machine} = ask({op: "machine", bundle}));
+  bundle = null;
 }
 
 // What is told of a job, one after the other.

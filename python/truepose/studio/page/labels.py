@@ -1,0 +1,165 @@
+"""What the page of a studio says, by the names that its scripts have for it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from truepose.language import say
+
+PLAIN = {
+    "as_in_file": "As in the file",
+    "at_pose": "at the pose shown",
+    "at_rest": "everything is answered",
+    "budget_caption": "As `truepose budget` ranks them, over the poses of the file.",
+    "calibration_caption": "Drop a file of measurements of this machine: what it says of it, as "
+    "`truepose calibrate` does. It is held in memory alone.",
+    "characteristic": "quantity",
+    "choose_file": "Choose a file",
+    "component": "Component",
+    "computes": "computing: {what}",
+    "computing": "computing",
+    "connecting": "connecting",
+    "cut": "There is more; save the file to have all of it.",
+    "edits": "{count} values changed",
+    "evaluate": "Evaluate",
+    "expected": "expected: {expected}",
+    "farthest_at": "A machine is farthest off at",
+    "feature": "feature",
+    "features": "Features file",
+    "fields_all": "{total} numbers",
+    "fields_changed": "{total} numbers, {changed} changed",
+    "fields_found": "{found} of {total} numbers",
+    "file_shown": "File shown",
+    "find_fields": "Find its numbers in the file",
+    "first": "first order",
+    "fit": "Residuals over their uncertainty: {before} before, {after} after the fit (rms); Birge "
+    "ratio {birge}, {count} readings, {freedom} degrees of freedom.",
+    "forget": "Forget it",
+    "found": "found: {found}",
+    "found_value": "found",
+    "go_there": "Show this pose",
+    "highest_over": "highest over the workspace",
+    "in_file": "in the file: {value}",
+    "largest_at": "{quantity}: largest {size}, at {time}.",
+    "left_out": "Poses left out: {why}",
+    "limits": "limits",
+    "line": "line",
+    "linear_share": "linear",
+    "lost": "The studio does not answer; the page keeps trying. Start it again with the same file.",
+    "measured_share": "measured",
+    "no_answer": "no answer",
+    "no_difference": "Nothing is changed.",
+    "no_edits": "as in the file",
+    "no_suspicions": "None.",
+    "not_connected": "The studio does not answer: nothing was changed.",
+    "not_in_file": "not in the file",
+    "not_live": "There are no quick numbers: {why}.",
+    "one_edit": "1 value changed",
+    "or_drop": "or drop one here, at most 20 MB.",
+    "over_workspace": "largest over the workspace",
+    "parameter": "parameter",
+    "parameters_left_out": "{count} smaller ones are not shown.",
+    "part_caption": "A program, and a file of features if the program names none, in the folder of "
+    "the machine file.",
+    "part_points": "{points} points of the path, {samples} machines at random.",
+    "plan": "Plan",
+    "plan_poses": "Poses to measure next",
+    "planned": "Poses to measure next",
+    "pose_of": "pose",
+    "pose_shown": "Pose shown:",
+    "poses_left_out": "{count} poses; the machine cannot take {out} others.",
+    "poses_used": "{count} poses.",
+    "program": "Program",
+    "quantity": "Quantity",
+    "rank": "rank",
+    "rank_of": "unknowns seen",
+    "reading": "reading",
+    "report_command": "Its report by a command:",
+    "residual_after": "after the fit",
+    "residual_before": "before",
+    "residuals": "Residuals, over their uncertainty, the farthest off first",
+    "rests": "{answer}: {on}.",
+    "rms": "rms over the workspace",
+    "rms_after": "{quantity} then known to, rms",
+    "rows_left_out": "{count} more are not shown.",
+    "saved": "Saved as {name}.",
+    "shapley": "Shapley",
+    "share": "share",
+    "shares_caption": "Shares of the variance at the pose shown.",
+    "some_changed": "{count}, {changed} changed",
+    "source_of": "source",
+    "sources_caption": "Each source alone, as commanded; known error, and with its tolerances, to "
+    "first order.",
+    "spread": "{component} spreads by {size} (standard deviation) at the pose shown.",
+    "steps": "{count} steps",
+    "suspicions": "Suspicions",
+    "take_back": "take the change back ({before})",
+    "too_large": "The file is larger than 20 MB.",
+    "total": "total",
+    "uncertainty": "uncertainty",
+    "uncertainty_before": "uncertainty before",
+    "unknown": "unknown",
+    "unknowns": "What was found",
+    "weight": "weight",
+    "where": "where",
+}
+
+ANSWERS = {
+    "known": "known error",
+    "machine": "the machine for this page",
+    "shares": "shares",
+    "verdict": "verdict",
+}
+
+TABS = {
+    "budget": "Budget",
+    "calibration": "Calibration",
+    "over_time": "Over time",
+    "part": "Part",
+    "shares": "Shares",
+    "sources": "Sources",
+}
+
+LINES = {
+    "found": "a machine found",
+    "linear": "linear maximum",
+    "proven": "proven: none above",
+}
+
+EXPLAINED = {
+    "found": "The largest error of one machine inside its tolerances, solved exactly.",
+    "linear": "Known error, and what tolerances add to it at most, to first order.",
+    "proven": "No machine inside its tolerances is farther off at any of the poses: a proof.",
+}
+
+WEIGHTS = {"dominant": "dominant", "negligible": "negligible", "relevant": "relevant"}
+
+STATES = {
+    "after compensation": "after compensation",
+    "before compensation": "before compensation",
+}
+
+PART_VERDICTS = {
+    "NOT met": "NOT met",
+    "NOT within": "NOT within",
+    "met": "met",
+    "undecided": "undecided",
+    "within": "within",
+}
+
+
+def labels() -> dict[str, Any]:
+    """All of it, in the language spoken."""
+    return {
+        **{name: say(PLAIN[name]) for name in PLAIN},
+        "answers": {name: say(ANSWERS[name]) for name in ANSWERS},
+        "tabs": {name: say(TABS[name]) for name in TABS},
+        "lines": {name: say(LINES[name]) for name in LINES},
+        "line_explained": {name: say(EXPLAINED[name]) for name in EXPLAINED},
+        "weights": {name: say(WEIGHTS[name]) for name in WEIGHTS},
+        "states": {name: say(STATES[name]) for name in STATES},
+        "part_verdicts": {name: say(PART_VERDICTS[name]) for name in PART_VERDICTS},
+    }
+
+
+__all__ = ["labels"]

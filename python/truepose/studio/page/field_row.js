@@ -17,7 +17,8 @@ function fieldRow(key, table, {said, send}) {
   const problem = element("p", {className: "problem", id: `${id}-problem`, role: "alert"});
   const row = element("div", {className: "field"}, label, input, unit, back, about, problem);
   row.dataset.key = key;
-  // `touched`: what stands in the input is not what was sent, or was refused.
+  // `touched`: what stands in the input is not what was sent, or was refused. `sending`: what the
+  // studio was told and has not taken yet; `next`: what it is told after that.
   let text = "", file = null, touched = false, sending = null, next = null, steps = false;
 
   function refuse(words) {
@@ -40,7 +41,7 @@ function fieldRow(key, table, {said, send}) {
       refuse(said.not_connected);
       return;
     }
-    sending = value;
+    sending = {value};
     touched = false;
     row.classList.add("sending");
   }
@@ -48,7 +49,7 @@ function fieldRow(key, table, {said, send}) {
   function commit() {
     const typed = input.value;
     // The same again is sent again: what it was refused for may be mended.
-    if (typed === (sending ?? text)) { touched = false; accept(); return; }
+    if (typed === (sending ? sending.value : text)) { touched = false; accept(); return; }
     steps = false;
     if (sending === null) give(typed, false);
     else next = {typed, joins: false};

@@ -27,6 +27,7 @@ function changingPart(place, setting, engine, moved) {
   function take(machine, shown) {
     // What is being dragged must not go away under the pointer.
     if (held) { waiting = [machine, shown]; return; }
+    const begun = performance.now();
     const before = part && part.end();
     const focus = part && placeOfFocus(body()), open = part && openDetails(body()).map(one => one.open);
     if (part) body().replaceWith(blank.cloneNode(true));
@@ -34,6 +35,7 @@ function changingPart(place, setting, engine, moved) {
     if (open) openDetails(body()).forEach((one, at) => { one.open = open[at] ?? one.open; });
     part.show(shown, true);
     if (focus) focusAgain(body(), focus);
+    place.dataset.taken = performance.now() - begun;
   }
 
   place.addEventListener("pointerdown", event => { held = body().contains(event.target); });
@@ -46,7 +48,7 @@ function changingPart(place, setting, engine, moved) {
     });
   }
 
-  return {take, get part() { return part; }, get held() { return held; }};
+  return {take, get part() { return part; }};
 }
 
 const openDetails = host => [...host.querySelectorAll("details")];

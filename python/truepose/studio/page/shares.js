@@ -1,5 +1,8 @@
 // The tab of the shares: which source and parameter the spread at the pose shown comes from.
 
+// Parameters with a smaller share are counted, and not shown.
+const LEAST_SHARE = 0.002;
+
 const sharesTab = {
   name: "shares", answer: "shares",
   build(host, {said, tell, numbers, findFields}) {
@@ -42,11 +45,13 @@ const sharesTab = {
       }
       const at = Number(select.value), name = components[at];
       const spread = filled(said.spread, {component: name, size: numbers.error(deviations[at], name)});
+      const large = value.parameters.filter(({total}) => total[at] >= LEAST_SHARE);
+      const others = value.left_out + value.parameters.length - large.length;
       body.replaceChildren(
         element("p", {className: "says"}, spread), table(said.source_of, value.sources, at, false),
-        table(said.parameter, value.parameters, at, true),
-        element("p", {className: "caption"}, value.left_out
-          ? filled(said.parameters_left_out, {count: value.left_out}) : "", ` ${said.shares_caption}`));
+        table(said.parameter, large, at, true),
+        element("p", {className: "caption"}, others
+          ? filled(said.parameters_left_out, {count: others}) : "", ` ${said.shares_caption}`));
     }
     return {show};
   },

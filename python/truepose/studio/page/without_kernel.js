@@ -31,5 +31,5 @@ function controlsAlone(host, setting, {names, moved}) {
     controls.show();
   }
 
-  return {take, part: {show, get state() { return state; }}, held: false};
+  return {take, part: {show, get state() { return state; }}};
 }

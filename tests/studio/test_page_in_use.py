@@ -32,6 +32,7 @@ NUMBER = """name => {
 AT_REST = """() => document.querySelector('[data-studio=status]').dataset.state === 'rest'
   && !document.querySelector('.field.sending')
   && document.getElementById('live').dataset.stale === 'no'
+  && document.getElementById('live').dataset.map === 'fine'
   && document.getElementById('live').dataset.settled === 'yes'"""
 EXPANSION = "strut.1.expansion"
 

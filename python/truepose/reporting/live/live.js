@@ -102,8 +102,7 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     find("factor").textContent = filled(words.magnified, {factor: view.show(picture, largest)});
     find("outside").textContent = status[0] === "ok" ? "" : words.statuses[status[0]];
     place.dataset.status = status[0];
-    map.update({...at, components, quantity}, moving);
-    legend();
+    mapAt(at, moving);
     told();
     worker.postMessage({
       id: ++job, pose: state.pose, condition: state.condition, scale: state.scale,
@@ -112,7 +111,13 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     place.dataset.step = performance.now() - begun;
     place.dataset.steps = 1 + Number(place.dataset.steps || 0);
     clearTimeout(rest);
-    if (moving) rest = setTimeout(() => { map.update({...at, components, quantity}, false); legend(); }, REST);
+    if (moving) rest = setTimeout(() => mapAt(at, false), REST);
+  }
+
+  function mapAt(at, coarse) {
+    map.update({...at, components, quantity}, coarse);
+    legend();
+    place.dataset.map = coarse ? "coarse" : "fine";
   }
 
   const inSpace = error => ["x", "y", "z"].map(name => {

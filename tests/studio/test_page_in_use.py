@@ -18,6 +18,7 @@ from browser import Heard, opened_browser
 from command_line import MACHINES, PLANAR
 from served_studio import ServedStudio, started, studio_of
 from system_package import missing
+from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import MachineFileError
 from truepose.reporting.live import part
 
@@ -399,7 +400,15 @@ def test_a_dropped_file_of_measurements_is_answered(browser: Any, tmp_path: Path
         visit.page.locator("[data-tab=calibration] form input").fill("3")
         visit.page.locator("[data-tab=calibration] form button").click()
         visit.page.wait_for_selector("[data-tab=calibration] .scroll .go", timeout=PATIENCE)
-        assert visit.page.locator("[data-tab=calibration] .go").count() == 3
+        shown = visit.page.locator("[data-tab=calibration] .go").all_inner_texts()
+        instruments = read_measurements(data / "delta_positions.csv", machine).instruments
+        planned = tp.plan(machine, instruments, 3)
+        first = planned.poses[planned.rank.tolist().index(1)]
+        assert len(shown) == 3
+        numbers = [float(one.replace("−", "-")) for one in re.findall(r"[−\d.]+", shown[0])]
+        assert numbers == [round(1000 * float(value), 3) for value in first]
+        for count in (1, 2, 3):
+            assert visit.number(f"planned.{count}.position") == planned.rms[count, 0]
         # What cannot be read is refused in its own words.
         visit.page.set_input_files(
             "#dropped-file", {"name": "b.csv", "mimeType": "text/csv", "buffer": b"\xff\xfe1"}

@@ -31,8 +31,9 @@ const calibrationTab = {
     });
     plan.hidden = true;
 
-    const plainNumber = value => value === null ? MISSING : String(Number(value.toPrecision(4)));
-    const number = (value, decimals = 2) => ({text: numbers.fixed(value, decimals), className: "number"});
+    const size = (value, unit) => value === null ? MISSING
+      : unit === "m" ? numbers.error(value, "position") : unit === "rad" ? numbers.error(value, "orientation")
+      : `${String(Number(value.toPrecision(4))).replace("-", MINUS)} ${unit}`;
 
     function residuals(rows) {
       const heads = [said.reading, said.line, said.pose_of, [said.residual_before, "number"],
@@ -53,17 +54,20 @@ const calibrationTab = {
       return scrolling(tableOf(heads, rows.slice(0, SHOWN_ROWS).map(one => [
         {text: one.label || one.name, title: one.name},
         ...["found", "uncertainty", "uncertainty_before"].map(key => (
-          {text: `${plainNumber(one[key])} ${one.unit}`, className: "number"})),
+          {text: size(one[key], one.unit), className: "number"})),
         {text: tell.percent(one.share), className: "number"},
       ])), said.unknowns);
     }
 
     function next({poses, rank, rms}) {
-      const heads = ["", said.pose_of, [said.rank_of, "number"],
+      const heads = [said.rank, said.pose_of,
         ...Object.keys(rms).map(name => [filled(said.rms_after, {quantity: tell.quantity(name)}), "number"])];
-      const rows = poses.map((pose, at) => [
-        at + 1, {node: tell.goTo(pose)}, number(rank[at] ?? null, 0),
-        ...Object.entries(rms).map(([name, values]) => tell.cell(values[at + 1] ?? null, name)),
+      // The one that buys most first; `rms` is after so many of them in that order.
+      const order = poses.map((_, at) => at).sort((a, b) => rank[a] - rank[b]);
+      const rows = order.map(at => [
+        rank[at], {node: tell.goTo(poses[at])},
+        ...Object.entries(rms).map(([name, values]) =>
+          tell.cell(values[rank[at]] ?? null, name, `planned.${rank[at]}.${name}`)),
       ]);
       return scrolling(tableOf(heads, rows), said.planned);
     }

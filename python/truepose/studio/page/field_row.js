@@ -1,5 +1,8 @@
 // One number of the file: its text can be changed, is sent, and is refused in the file's own words.
 
+// Characters from which a text has a line of its own.
+const LONG = 15;
+
 // `send`: a function of key, text (null takes the edit back), whether it joins the step before, and
 // what to do where it is refused; false where there is no connection.
 function fieldRow(key, table, {said, send}) {
@@ -102,6 +105,7 @@ function fieldRow(key, table, {said, send}) {
       about.textContent = description;
       row.title = description;
       row.classList.toggle("edited", field.edited);
+      row.classList.toggle("long", text.length > LONG);
       back.hidden = !field.edited;
       const before = file === null ? said.not_in_file : filled(said.in_file, {value: file});
       back.title = before;

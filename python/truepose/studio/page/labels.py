@@ -72,7 +72,6 @@ PLAIN = {
     "program": "Program",
     "quantity": "Quantity",
     "rank": "rank",
-    "rank_of": "unknowns seen",
     "reading": "reading",
     "report_command": "Its report by a command:",
     "residual_after": "after the fit",

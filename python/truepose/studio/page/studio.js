@@ -96,6 +96,10 @@ async function startStudio() {
   });
   const names = TABS.filter(tab => tab.asked).map(tab => tab.name);
   find("report").href = addresses.report;
+  const bar = host.querySelector(".studio-bar");
+  new ResizeObserver(() => {
+    document.body.style.setProperty("--bar", `${bar.offsetHeight}px`);
+  }).observe(bar);
 
   // What went wrong with something that has no place of its own; null: there is no connection.
   function notify(problems) {

@@ -36,12 +36,12 @@ async function startStudio() {
   notLive(setting.bundle ? "" : setting.why);
 
   // Another machine, unless it is the one that is shown.
-  function take({bundle, drawing, planar}) {
+  function take({bundle, drawing, planar, sources}) {
     const text = JSON.stringify(bundle);
     if (text === machine || (!engine && !state)) return;
     try {
       link.file(asInTheFile(bundle));
-      live.take({bundle, drawing, planar}, link.now);
+      live.take({bundle, drawing, planar, sources}, link.now);
       machine = text;
       if (engine) root.dataset.liveReady = "drawn";
       place.dataset.machines = 1 + Number(place.dataset.machines || 0);

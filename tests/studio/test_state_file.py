@@ -63,7 +63,7 @@ def test_a_state_that_others_could_read_is_none(home: Path) -> None:
     assert read_state(path).token != kept.token
 
 
-GOOD = KeptState(port=8770, history=HISTORY).to_json()
+GOOD = KeptState(port=8770, token="t" * 43, history=HISTORY).to_json()
 
 
 @pytest.mark.parametrize(

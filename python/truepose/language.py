@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -90,6 +91,7 @@ def speaking(code: str) -> Iterator[None]:
         _SPOKEN.reset(before)
 
 
+@cache
 def _language(code: str) -> Language:
     if code == ENGLISH:
         return Language(ENGLISH)

@@ -21,8 +21,10 @@ import truepose as tp
 from command_line import PLANAR, call
 from served_studio import LIMIT, ServedStudio, Window, started, studio_of
 from truepose.cli import run
+from truepose.language import speaking
 from truepose.reporting.live import part
 from truepose.studio.shared_state import EVERY, LARGEST_FILE
+from truepose.verdict.answer import BEFORE
 
 Capture = pytest.CaptureFixture[str]
 
@@ -484,3 +486,25 @@ def test_without_the_extra_it_says_so(
     outcome = call(capsys, "studio", PLANAR)
     assert (outcome.code, outcome.codes) == (2, ["extra-missing"])
     assert "pip install 'truepose[studio]'" in outcome.err
+
+
+def test_page_answers_and_report_are_in_the_language_asked_for(tmp_path: Path) -> None:
+    file = folder_of(tmp_path) / "m.toml"
+    machine = tp.load(file)
+    english = [answer.rests_on for answer in tp.accuracy(machine, states=(BEFORE,))]
+    with speaking("de"):
+        expected = [answer.rests_on for answer in tp.accuracy(machine, states=(BEFORE,))]
+    assert english != expected
+    with studio_of(file, tmp_path / "state", "--language", "de") as studio:
+        for path in ("/", "/report"):
+            status, _, page = studio.get(f"{path}?token={studio.token}")
+            assert status == 200
+            assert b'<html lang="de"' in page
+        with studio.window() as window:
+            told = window.until("answer", name="verdict")["value"]
+    assert [one["rests_on"] for one in told] == expected
+
+
+def test_a_language_that_there_is_not_is_told_before_anything_listens(capsys: Capture) -> None:
+    assert run(["studio", str(PLANAR), "--language", "xx"]) == 2
+    assert "unknown-language" in capsys.readouterr().err

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from truepose.cli._ending import INTERRUPTED
-from truepose.cli._options import machine_argument, takes
+from truepose.cli._options import language_option, machine_argument, takes
 
 PORT = 8768
 """Where nothing else is said, and nothing was before."""
@@ -38,14 +38,22 @@ PORT = 8768
         default=None,
         help="Open the page in a browser. Default: where the output is a terminal.",
     ),
+    language_option,
 )
-def command(machine_file: Path, host: str, port: int | None, opens: bool | None) -> int:
+def command(language: str, **options: Any) -> int:
     """Serve the live page with the machine file behind it.
 
     On the page every number of the file can be changed, undone and saved as another file; the
     verdict over the workspace, what it rests on, and shares follow. The machine file itself is
     never written. The address has a token, without which nothing is served; Ctrl-C ends it.
     """
+    from truepose.reporting.drawing_packages import speaking_for
+
+    with speaking_for(language):
+        return _serve(**options)
+
+
+def _serve(machine_file: Path, host: str, port: int | None, opens: bool | None) -> int:
     from truepose.cli._steps import load_machine
     from truepose.files.one_run import is_stdin
     from truepose.reporting.drawing_packages import module_that_draws

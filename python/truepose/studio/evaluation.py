@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from truepose.errors import Problem
+from truepose.language import speaking
 from truepose.studio.answers import KNOWN
 from truepose.studio.jobs import Asked, Given, Job, answer
 
@@ -41,8 +42,9 @@ def work(connection: Connection) -> None:
             job: Job | None = connection.recv()
             if job is STOP:  # of one that had ended by itself
                 continue
-            for given in answer(job, connection.poll):
-                connection.send(given)
+            with speaking(job.language):
+                for given in answer(job, connection.poll):
+                    connection.send(given)
             connection.send(STOP)
     except (EOFError, OSError):
         return

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from truepose.errors import TrueposeError
+from truepose.language import ENGLISH
 from truepose.machine.loader import load_text
 from truepose.sources import REGISTRY
 from truepose.studio.answers import ANSWERS, DroppedFile, Question, Value
@@ -32,7 +33,10 @@ Asked = str | AskedTab
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be answered, in this order, of a text as of a file at a path, with settings."""
+    """What is to be answered, in this order, of a text as of a file at a path, with settings.
+
+    `language`: the code of that in which it is said.
+    """
 
     number: int
     path: Path
@@ -40,6 +44,7 @@ class Job:
     settings: Settings
     asked: tuple[Asked, ...]
     files: Mapping[int, DroppedFile] = field(default_factory=dict)
+    language: str = ENGLISH
 
 
 @dataclass(frozen=True)

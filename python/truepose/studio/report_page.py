@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from truepose.errors import TrueposeError
+from truepose.language import speaking
 from truepose.machine.loader import load_text
 from truepose.reporting.assembly import Watcher
 from truepose.reporting.report import made
@@ -23,10 +24,10 @@ def report_of(path: Path, text: str) -> str:
     return page
 
 
-def work(connection: Connection, path: Path, text: str) -> None:
-    """What a process of its own does: sends the page, or what is wrong."""
+def work(connection: Connection, path: Path, text: str, language: str) -> None:
+    """What a process of its own does: sends the page, in a language, or what is wrong."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a word
-    with connection:
+    with connection, speaking(language):
         try:
             connection.send(report_of(path, text))
         except TrueposeError as failure:

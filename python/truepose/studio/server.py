@@ -26,6 +26,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from truepose.errors import TrueposeError
+from truepose.language import spoken
 from truepose.studio import messages, report_page
 from truepose.studio.access import Access
 from truepose.studio.evaluation import Evaluator, by_itself
@@ -207,7 +208,12 @@ class Studio:
         async with self._reporting:
             try:
                 made = await asyncio.to_thread(
-                    by_itself, report_page.work, path, text, started=self._note_process
+                    by_itself,
+                    report_page.work,
+                    path,
+                    text,
+                    spoken().code,
+                    started=self._note_process,
                 )
             except EOFError:  # ended by the system, for want of memory
                 made = ()

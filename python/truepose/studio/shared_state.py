@@ -14,6 +14,7 @@ from typing import Any
 from truepose.errors import Problem, RequestError, TrueposeError
 from truepose.files.one_run import once_more
 from truepose.files.wording import one_of
+from truepose.language import spoken
 from truepose.machine import Machine
 from truepose.runs.dataset import component_units
 from truepose.runs.quantities import quantities
@@ -157,7 +158,9 @@ class SharedState:
         if not asked:
             return None
         files = self.files if any(isinstance(one, AskedTab) for one in asked) else {}
-        return Job(self.number, self.file.path, self._text, self.settings, asked, dict(files))
+        text, path = self._text, self.file.path
+        held, language = dict(files), spoken().code
+        return Job(self.number, path, text, self.settings, asked, held, language)
 
     def given(self, given: Given) -> list[tuple[list[int] | None, Message]]:
         """Take an answer: what to tell, and which windows; None: all of them."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterator
+from inspect import unwrap
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 import truepose as tp
+import truepose.language
 from command_line import PLANAR, call
 from generators import generator
 from truepose.language import languages, say, say_counted, speaking
@@ -164,6 +166,7 @@ def test_english_needs_no_babel(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "babel", None)
+    monkeypatch.setattr(truepose.language, "_language", unwrap(truepose.language._language))  # noqa: SLF001
     with speaking("en"):
         assert say("{names} and {last}", names="a", last="b") == "a and b"
     outcome = call(capsys, "report", PLANAR, "--language", "de", "--output", tmp_path / "p.html")

@@ -21,11 +21,12 @@ from truepose.runs.quantities import POSITIONS, quantities
 from truepose.runs.variables import Variables, stream_of
 from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.bounds import proven_bounds
+from truepose.verdict.answer import AFTER, BEFORE
 from web_kernel import WebKernel, numbers
 from web_machine import WebMachine
 from weighing_machines import WEIGHING
 
-QUICK = {"hexapod", "tricept", "delta_linear", "planar_two_slider"}
+QUICK = {"hexapod", "tricept", "linear_delta", "planar_two_slider"}
 POSES = 1000
 
 ROUNDING = 1e-14
@@ -195,6 +196,35 @@ def test_bounds_are_the_same(machine: WebMachine) -> None:
         assert worst["status"] == "ok"
         for kind, size in zip(kinds, sizes, strict=True):
             assert worst[kind] <= size
+
+
+@pytest.mark.parametrize("command", ["nominal", "corrected"])
+def test_largest_errors_to_first_order_are_the_same(machine: WebMachine, command: str) -> None:
+    """Those of `tp.budget` of each source alone, and those that the verdict goes by, of all."""
+    poses = machine.poses(4, 13)
+    page, condition = machine.condition(14)
+    only = replace(machine.machine, sources=tuple(machine.live))
+    block = machine.block(poses, condition)
+    budget = tp.budget(only, poses, condition)
+    state = BEFORE if command == "nominal" else AFTER
+    for at, pose in enumerate(block.indices):
+        reply = machine.ask(
+            "largest", pose=poses[pose], condition=page, command=command, sources=True
+        )
+        assert reply["status"] == "ok"
+        assert reply["by_source"].keys() == {source.name for source in machine.live}
+        for answer in tp.accuracy(only, poses[[pose]], condition, states=(state,)):
+            np.testing.assert_allclose(
+                reply["largest"][answer.quantity], answer.linear.value, rtol=1e-9, atol=CLOSE
+            )
+        if command == "corrected":
+            continue
+        for source, of in reply["by_source"].items():
+            expected = budget["largest"].sel(pose=at, source=source)
+            for kind, size in of.items():
+                np.testing.assert_allclose(
+                    size, expected.sel(quantity=kind), rtol=1e-9, atol=CLOSE, err_msg=source
+                )
 
 
 def test_samples_of_equal_seed_are_the_same(machine: WebMachine) -> None:

@@ -72,6 +72,7 @@ def test_unknown_numbers_and_wrong_lengths_are_refused(hexapod: WebMachine) -> N
         ("sensitivities", {"poses": [home], "columns": [10**6]}),
         ("sensitivities", {"poses": [home], "columns": [-1]}),
         ("loads", {"poses": [home], "columns": [0], "wrench": [0.0] * 5}),
+        ("largest", {"pose": [home]}),
         ("bounds", {"pose": [home]}),
         ("samples", {"pose": home, "seed": -1}),
         ("samples", {"pose": home}),
@@ -107,7 +108,7 @@ def test_numbers_of_any_size_are_answered(hexapod: WebMachine) -> None:
                     **given,
                 )
                 assert len(reply["errors"]) == 1
-                for op in ("bounds", "worst"):
+                for op in ("largest", "bounds", "worst"):
                     assert hexapod.ask(op, pose=at, command=command, **given)["status"]
             try:
                 run = hexapod.ask("samples", pose=at, seed=1, **given)["run"]

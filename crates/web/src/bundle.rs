@@ -43,6 +43,8 @@ pub struct Compliance {
 
 /// One thing that is not known.
 pub struct Unknown {
+    /// Of which source.
+    pub source: String,
     /// What its half width is scaled with.
     pub group: String,
     /// Half its band in standard deviations.
@@ -251,7 +253,8 @@ fn unknowns(given: &Given<'_>) -> Answer<(Vec<Unknown>, Vec<Variable>)> {
         let distribution = variable.item("distribution")?;
         let (shape, sigmas, ends) = shape(&distribution)?;
         let group = variable.get("group").map_or(Ok(""), |group| group.text())?.to_owned();
-        unknowns.push(Unknown { group, sigmas, ends });
+        let source = variable.item("source")?.text()?.to_owned();
+        unknowns.push(Unknown { source, group, sigmas, ends });
         variables.push(Variable {
             shape,
             stream: variable.item("stream")?.whole()?,

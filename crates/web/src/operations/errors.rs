@@ -36,10 +36,6 @@ pub fn errors(state: &mut State, request: &Given<'_>) -> Answer<Value> {
         let values = rows(&known.values, count, known.columns.len());
         reply.insert("shifts".to_owned(), json!({ "columns": known.columns, "values": values }));
     }
-    if request.is_asked("half_widths")? {
-        let half = placed.half_widths(&condition);
-        reply.insert("half_widths".to_owned(), rows(&half, count, bundle.columns.len()));
-    }
     if request.is_asked("centres_actual")? {
         let (placements, centres) = actual(&placed, &joints, &known, &status);
         reply.insert("actual_placements".to_owned(), rows(&placements, count, 7));

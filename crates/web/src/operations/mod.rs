@@ -3,6 +3,7 @@
 mod bounds;
 mod errors;
 mod first_order;
+mod largest;
 mod machine;
 mod samples;
 
@@ -22,6 +23,7 @@ const OPERATIONS: &[(&str, Operation)] = &[
     ("errors", errors::errors),
     ("sensitivities", first_order::sensitivities),
     ("loads", first_order::loads),
+    ("largest", largest::largest),
     ("bounds", bounds::bounds),
     ("worst", bounds::worst),
     ("samples", samples::begin),

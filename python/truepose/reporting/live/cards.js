@@ -29,7 +29,8 @@ function cardsOf(host, strip, {states, quantities, target, words, numbers}) {
   }
 
   // `sizes`: by line and quantity; a number, null (there is none), a text, or undefined (not yet).
-  function show(name, verdict, said, sizes) {
+  // `decides`: by quantity the line that the verdict rests on.
+  function show(name, verdict, said, sizes, decides) {
     const {card, word, short, cells} = cards[name];
     if (word.textContent !== said) word.textContent = said;
     short.textContent = said;
@@ -38,6 +39,7 @@ function cardsOf(host, strip, {states, quantities, target, words, numbers}) {
       cells[line].forEach((cell, at) => {
         const quantity = quantities[at], value = sizes[line][quantity];
         cell.classList.toggle("said", typeof value === "string");
+        cell.classList.toggle("decides", decides[quantity] === line);
         put(cell, value, value === undefined ? words.waiting
           : typeof value === "string" ? value
           : numbers.error(value, quantity, target[quantity] ?? null));

@@ -18,6 +18,7 @@ PLAIN = {
     "factors": "Tolerances and stiffness",
     "failed": "not computed",
     "force_along": "force {axis}",
+    "here": "Now: {low} to {high}.",
     "load": "Load on the tool",
     "magnified": "Errors are drawn {factor} times larger than they are.",
     "moment": "Moment",

@@ -37,8 +37,7 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
   const cards = cardsOf(find("cards"), find("strip"), {
     states: {before: words.as_commanded, after: words.compensated}, quantities, target, words, numbers,
   });
-  const table = sourcesTable(find("sources"), {components, quantities, sources, words, numbers});
-  const reaches = reachesOf({bundle, machine, components, quantities, ask});
+  const table = sourcesTable(find("sources"), {components, quantities, sources, target, words, numbers});
   const view = machineView(find("machine"), {
     drawing, planar: setting.planar, box: edgesOf(bundle.workspace, commanded),
     grouped: factor => numbers.fixed(factor, factor < 10 ? 1 : 0), before: before && before.view,
@@ -76,23 +75,22 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     // What of a state comes later: `worst`, `bounds`, `samples`, and whether these are `done`.
     known = {status: {before: status[0], after: status[0]}, errors: {}, later: {before: {}, after: {}}};
     const picture = {centres: null, errors: {}, ellipses: {}};
-    let bySource = {}, sizes = {}, halfWidths = [];
+    let bySource = {};
+    const sizes = {};
     if (status[0] === "ok") {
       for (const [name, command] of Object.entries(COMMAND_OF)) {
-        const whole = name === "before" ? {sources: true, centres_actual: true, half_widths: true} : {};
+        const whole = name === "before" ? {sources: true, centres_actual: true} : {};
         const told = ask({op: "errors", ...at, poses: [state.pose], command, ...whole});
         known.status[name] = told.status[0];
         known.errors[name] = told.status[0] === "ok" ? told.errors[0] : null;
         if (name === "before") {
           bySource = Object.fromEntries(Object.entries(told.by_source || {}).map(
             ([source, errors]) => [source, errors[0]]));
-          halfWidths = told.half_widths[0];
           picture.actual = known.errors.before && told.actual_centres ? told.actual_centres[0] : null;
         }
         picture.errors[name] = known.errors[name] && inSpace(known.errors[name]);
-      }
-      if (known.errors.before) {
-        sizes = reaches(state.pose, halfWidths, bySource, known.errors);
+        const far = ask({op: "largest", ...at, pose: state.pose, command, sources: name === "before"});
+        Object.assign(sizes, far.by_source, {[name]: far.largest});
       }
       Object.assign(picture, {centres: centres[0], tool: placements[0].slice(0, 3)});
     }
@@ -130,7 +128,7 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     const shown = {};
     for (const name of Object.keys(COMMAND_OF)) {
       const later = known.later[name], fine = known.status[name] === "ok";
-      const sizes = Object.fromEntries(LINES.map(line => [line, {}])), verdicts = [];
+      const sizes = Object.fromEntries(LINES.map(line => [line, {}])), verdicts = [], decides = {};
       for (const each of quantities) {
         const size = fine ? sizeOf(known.errors[name], components, each) : null;
         const sample = fine && later.samples ? columnOf(later.samples, each) : null;
@@ -143,11 +141,12 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
         if (target[each] !== undefined) {
           const found = [size, witness ?? null, within && sample ? sample.maximum : null];
           verdicts.push(judged(target[each], each, later.bounds, found));
+          decides[each] = verdicts.at(-1) !== "missed" ? "proven" : size > target[each] ? "known" : "found";
         }
       }
       const verdict = notLive.length ? "none" : !fine ? "outside"
         : !verdicts.length ? "unasked" : together(verdicts);
-      cards.show(name, verdict, said(verdict, name), sizes);
+      cards.show(name, verdict, said(verdict, name), sizes, decides);
       shown[name] = fine && later.samples ? later.samples : null;
     }
     view.add({ellipses: Object.fromEntries(Object.entries(shown).map(
@@ -186,6 +185,8 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     find("low").textContent = ends.low;
     find("high").textContent = ends.high;
     find("beyond").hidden = !ends.beyond;
+    find("here").hidden = !ends.beyond && !ends.below;
+    find("here").textContent = filled(words.here, ends.here);
   }
 
   // Which coordinates the map is over, and of which quantity it and the distribution are.

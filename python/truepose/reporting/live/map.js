@@ -112,13 +112,14 @@ function mapView(canvas, {
     plane.text(`${q} \u2191`, [2, EDGE.top + high + 29], "quiet");
   }
 
-  // What the ends of the scale are, and whether something is beyond them.
+  // What the ends of the scale are, and from where to where it goes if something is beyond them.
   function legend() {
     if (!ends) return null;
     const [low, high] = [ends.low, ends.high].map(value => numbers.error(value, ends.quantity));
-    const beyond = shown.sizes.some(size => size !== null && size > ends.high * (1 + 1e-9));
-    const below = shown.sizes.some(size => size !== null && size < ends.low * (1 - 1e-9));
-    return {low, high, beyond, below};
+    const there = shown.sizes.filter(size => size !== null);
+    const least = Math.min(...there), most = Math.max(...there);
+    const here = {low: numbers.error(least, ends.quantity), high: numbers.error(most, ends.quantity)};
+    return {low, high, here, beyond: most > ends.high * (1 + 1e-9), below: least < ends.low * (1 - 1e-9)};
   }
 
   const set = ([x, y]) => {

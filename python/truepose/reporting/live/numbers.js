@@ -34,17 +34,19 @@ function numbersOf({units, marks}) {
   function error(value, name, compared = null) {
     if (value === null) return MISSING;
     const unit = ofError(name), number = value / unit.si;
-    let decimals = decimalsOf(Math.abs(number));
-    if (compared !== null) {
-      const other = compared / unit.si, finest = decimals + FINER;
-      while (decimals < finest && number !== other && fixed(number, decimals) === fixed(other, decimals)) {
-        decimals++;
-      }
-    }
+    const decimals = finer(number, decimalsOf(Math.abs(number)), compared === null ? null : compared / unit.si);
     return `${fixed(number, decimals)} ${unit.label}`;
   }
 
-  return {fixed, decimalsOf, isLength, ofError, ofPose, shown, meant, error};
+  // So many decimals, or more, that a number differs from another one, unless it is that or there is none.
+  function finer(number, decimals, other) {
+    const finest = decimals + FINER;
+    while (other !== null && decimals < finest && number !== other
+      && fixed(number, decimals) === fixed(other, decimals)) decimals++;
+    return decimals;
+  }
+
+  return {fixed, decimalsOf, finer, isLength, ofError, ofPose, shown, meant, error};
 }
 
 // The size of an error by its components, position or orientation; null where it is not known.

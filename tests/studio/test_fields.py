@@ -85,6 +85,18 @@ def test_units_groups_and_tables() -> None:
     assert turned["tolerance.drive.*.offset"].dimension == "angle"
 
 
+def test_a_word_of_a_few_says_which() -> None:
+    fields = fields_in(MACHINES / "hexapod.toml")
+    material = fields["strut.1.material"]
+    assert (material.text, material.unit, material.group) == ("steel", "", False)
+    assert {"steel", "invar", "carbon fibre"} < set(material.choices)
+    assert fields["strut.1.stiffness"].choices == ()
+    modes = [field for key, field in fields_in(MACHINES / "five_bar.toml").items() if "mode" in key]
+    assert [field.choices for field in modes] == [("+", "-")] * 2
+    # What a part is, is not changed.
+    assert not [key for key in fields_in(MACHINES / "3prs.toml") if key.endswith(".kind")]
+
+
 def test_what_is_edited_says_what_the_file_has() -> None:
     file = OpenedFile.read(MACHINES / "hexapod.toml")
     edits = (("strut.1.stiffness", "31 N/um"), ("strut.1.mass", "2 kg"))

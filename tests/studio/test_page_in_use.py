@@ -21,6 +21,7 @@ from system_package import missing
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import MachineFileError
 from truepose.reporting.live import part
+from truepose.verdict.answer import BEFORE
 
 PATIENCE = 60_000
 """Milliseconds: a busy machine is slow, and slowness is no fault here."""
@@ -205,6 +206,63 @@ def test_a_refused_value_says_so_in_the_words_of_the_file(visit: Visit) -> None:
     assert visit.problem(key).inner_text() == ""
     assert undo.get_attribute("title") == steps
     assert visit.page.locator("[data-studio=edits]").inner_text() == "as in the file"
+
+
+def test_what_was_refused_is_told_above_all_and_goes_with_a_reset(visit: Visit) -> None:
+    key, page = "condition.temperature", visit.page
+    told = page.locator("[data-studio=refused]")
+    before, answers = visit.input(key).input_value(), visit.looks()
+    assert told.is_hidden()
+    visit.find(key)
+    visit.input(key).fill("warm")
+    visit.input(key).press("Enter")
+    page.wait_for_selector("[data-studio=refused]:not([hidden])")
+    assert told.inner_text() == "1 value refused"
+    visit.find("nothing of this name")
+    told.click()
+    assert visit.input(key).evaluate("field => field === document.activeElement")
+    page.locator("[data-studio=reset]").click()
+    page.wait_for_selector("[data-studio=refused][hidden]", state="attached")
+    assert visit.input(key).input_value() == before
+    assert visit.problem(key).inner_text() == ""
+    visit.rest()
+    assert visit.looks() == answers
+
+
+def test_another_condition_than_that_of_the_file_is_told_above_all(visit: Visit) -> None:
+    edits, page = visit.page.locator("[data-studio=edits]"), visit.page
+    assert edits.inner_text() == "as in the file"
+    note = page.locator("[data-studio=condition]")
+    assert note.is_hidden()
+    page.locator('[data-of="temperature"] input[type=number]').fill("50")
+    page.wait_for_selector("[data-studio=condition]:not([hidden])")
+    assert edits.inner_text() == "as in the file; shown at other temperatures or another load"
+    cards = page.locator("[data-studio=cards]")
+    assert note.bounding_box()["y"] < cards.bounding_box()["y"]
+    page.locator("[data-live=reset]").click()
+    page.wait_for_selector("[data-studio=condition][hidden]", state="attached")
+    visit.rest()
+
+
+def test_a_material_is_chosen_from_a_list(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_bytes((MACHINES / "hexapod.toml").read_bytes())
+    key = "strut.1.material"
+    with studio_of(tmp_path / "m.toml", tmp_path / "state") as studio:
+        visit = opened(browser, studio, tmp_path)
+        visit.rest()
+        visit.find(key)
+        chosen = visit.page.locator(f'[data-key="{key}"] select')
+        assert chosen.input_value() == "steel"
+        chosen.select_option("invar")
+        visit.page.wait_for_selector(f'[data-key="{key}"].edited')
+        visit.rest()
+        machine = tp.load(tmp_path / "m.toml", settings={key: "invar"})
+        of_file = tp.load(tmp_path / "m.toml")
+        position = tp.accuracy(machine, states=(BEFORE,))[0].linear.value
+        assert visit.number("workspace.before.linear.position") == pytest.approx(position, 1e-9)
+        assert abs(position - tp.accuracy(of_file, states=(BEFORE,))[0].linear.value) > 1e-6
+        visit.page.close()
+    assert visit.complaints == []
 
 
 def test_undo_redo_reset_and_the_difference(visit: Visit) -> None:

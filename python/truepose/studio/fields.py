@@ -1,7 +1,8 @@
 """Every number of a machine file as a field: its key, its text, its unit and what it is.
 
-A field is what `--set KEY=VALUE` can change: a number, a component of a point, or a list that is
-written as a whole. What it means the machine file's own schema says, as `docs/machine_file.md` has.
+A field is what `--set KEY=VALUE` can change: a number, a component of a point, a list that is
+written as a whole, or a word that is one of a few, as a material. What it means the machine file's
+own schema says, as `docs/machine_file.md` has.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ class FileField:
     unit: str = ""
     dimension: str = ""
     group: bool = False
+    choices: tuple[str, ...] = ()
+    """What a word may be; empty of what is none."""
     file: str | None = None
     """As it stands in the file without edits; None where that does not have it."""
 
@@ -63,6 +66,7 @@ class FileField:
             "unit": self.unit,
             "dimension": self.dimension,
             "group": self.group,
+            "choices": list(self.choices),
             "edited": self.text != self.file,
         }
 
@@ -200,10 +204,13 @@ class _Walk:
                 name = deeper if deeper in _descriptions() or not known else about
                 yield from self._entry(f"{path}.{key}", name, table, below, node)
             return
+        group = path.startswith(f"{EACH}.")
+        choices = _choices_of_word(entry, schema)
+        if choices and not path.endswith(".kind"):
+            yield FileField(path, str(entry), table, about, group=group, choices=choices)
         if not _is_number(entry, schema):
             return
         dimension, unit = self._unit(path, entry, schema)
-        group = path.startswith(f"{EACH}.")
         field = FileField(path, _text(entry), table, about, unit, dimension, group)
         if _is_point(entry, schema):
             for axis, component in zip(_XYZ, entry, strict=True):
@@ -273,6 +280,15 @@ def _parts(schema: Json) -> Iterator[Json]:
         for member in (*choice.get("prefixItems", ()), choice.get("items", {})):
             if isinstance(member, dict) and member:
                 yield from _choices(member)
+
+
+def _choices_of_word(entry: Any, schema: Json) -> tuple[str, ...]:
+    """The words that a word may be exchanged for; what a part is, its kind, is none."""
+    for choice in _choices(schema):
+        words = choice.get("enum", ())
+        if entry in words and len(words) > 1 and all(isinstance(word, str) for word in words):
+            return tuple(words)
+    return ()
 
 
 def _is_number(entry: Any, schema: Json) -> bool:

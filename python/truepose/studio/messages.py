@@ -218,6 +218,7 @@ class FieldOfMessage(_Message):
     unit: str
     dimension: str
     group: bool
+    choices: list[str]
     edited: bool
 
 

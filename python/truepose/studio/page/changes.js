@@ -1,10 +1,14 @@
 // What was changed of the file: undone, redone, taken back, and the file that changed meanwhile.
 
-function changesBar(find, {said, say, refused}) {
-  const [undo, redo, reset] = ["undo", "redo", "reset"].map(name => {
-    const button = find(name);
-    button.addEventListener("click", () => say({type: name}, refused));
-    return button;
+// `takeBack`: what is to be done with what the fields refused.
+function changesBar(find, {said, say, refused, takeBack}) {
+  let changed = 0, refusals = 0;
+  const [undo, redo, reset] = ["undo", "redo", "reset"].map(find);
+  undo.addEventListener("click", () => say({type: "undo"}, refused));
+  redo.addEventListener("click", () => say({type: "redo"}, refused));
+  reset.addEventListener("click", () => {
+    if (changed) say({type: "reset"}, refused);
+    takeBack();
   });
   const notice = find("changed");
   const again = edits => () => say({type: "reload", edits}, refused);
@@ -28,15 +32,21 @@ function changesBar(find, {said, say, refused}) {
   }
 
   return {
-    heard({undo: back, redo: forward, edits, file}) {
+    // So many texts stand in fields that the file does not take.
+    refused(count) {
+      refusals = count;
+      able(reset, changed + refusals > 0);
+    },
+    heard({undo: back, redo: forward, edits, file, condition}) {
       able(undo, back > 0);
       able(redo, forward > 0);
-      able(reset, edits.length > 0);
+      changed = edits.length;
+      able(reset, changed + refusals > 0);
       undo.title = filled(said.steps, {count: back});
       redo.title = filled(said.steps, {count: forward});
-      find("edits").textContent = edits.length
-        ? filled(edits.length === 1 ? said.one_edit : said.edits, {count: edits.length})
-        : said.no_edits;
+      const told = !changed ? said.no_edits
+        : filled(changed === 1 ? said.one_edit : said.edits, {count: changed});
+      find("edits").textContent = condition ? filled(said.other_condition, {changed: told}) : told;
       notice.hidden = !file.changed;
     },
   };

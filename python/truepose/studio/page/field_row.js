@@ -1,19 +1,22 @@
-// One number of the file: its text can be changed, is sent, and is refused in the file's own words.
+// One number or word of the file: its text can be changed, is sent, and is refused in the file's own words.
 
 // Characters from which a text has a line of its own.
 const LONG = 15;
 
 // `send`: a function of key, text (null takes the edit back), whether it joins the step before, and
-// what to do where it is refused; false where there is no connection.
-function fieldRow(key, table, {said, send}) {
+// what to do where it is refused; false where there is no connection. `choices`: what a word may be,
+// none of a number. `changed` is told when a text is refused, and when that is over.
+function fieldRow({key, table, choices}, {said, send, changed}) {
   const id = `field-${key.replace(/\W/g, character => `_${character.charCodeAt(0)}`)}`;
   const path = table.replace(/^\[|\]$/g, "");
   const short = key.startsWith(`${path}.`) ? key.slice(path.length + 1) : key;
   const label = element("label", {htmlFor: id}, short.replace(/[._]/g, "$&\u200b"));
-  const input = element("input", {
-    type: "text", id, spellcheck: false, autocomplete: "off", autocapitalize: "off",
-    "aria-describedby": `${id}-about ${id}-problem`,
-  });
+  const described = {id, "aria-describedby": `${id}-about ${id}-problem`};
+  const input = choices.length
+    ? element("select", described, ...choices.map(word => element("option", {value: word}, word)))
+    : element("input", {
+      ...described, type: "text", spellcheck: false, autocomplete: "off", autocapitalize: "off",
+    });
   const unit = element("span", {className: "unit"});
   const back = element("button", {type: "button", className: "back", hidden: true}, "\u21ba");
   const about = element("p", {className: "about", id: `${id}-about`});
@@ -31,12 +34,17 @@ function fieldRow(key, table, {said, send}) {
     problem.textContent = words;
     input.setAttribute("aria-invalid", "true");
     row.classList.remove("sending");
+    changed();
   }
 
   function accept() {
+    const was = isRefused();
     problem.textContent = "";
     input.removeAttribute("aria-invalid");
+    if (was) changed();
   }
+
+  const isRefused = () => input.hasAttribute("aria-invalid");
 
   function give(value, joins) {
     accept();
@@ -79,7 +87,7 @@ function fieldRow(key, table, {said, send}) {
   input.addEventListener("change", commit);
   input.addEventListener("blur", () => { steps = false; });
   input.addEventListener("keydown", event => {
-    const up = {ArrowUp: 1, ArrowDown: -1}[event.key];
+    const up = choices.length ? 0 : {ArrowUp: 1, ArrowDown: -1}[event.key];
     if (up && !event.altKey && !event.ctrlKey && !event.metaKey) {
       event.preventDefault();
       step(event.shiftKey ? 10 * up : up);
@@ -125,6 +133,9 @@ function fieldRow(key, table, {said, send}) {
       }
     },
     lost() { sending = next = null; steps = false; row.classList.remove("sending"); },
+    // What was refused, or is being typed, goes.
+    takeBack,
+    isRefused,
     get text() { return text; },
   };
 }

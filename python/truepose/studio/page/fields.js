@@ -5,7 +5,7 @@ const NEXT = ["[accuracy]", "[condition]", "[workspace]"];
 const OPEN = ["[accuracy]", "[condition]"];
 const MOST_OPEN = 30;
 
-function fieldsPanel({list, filter, only, count}, {said, say}) {
+function fieldsPanel({list, filter, only, count, refused}, {said, say, told}) {
   let rows = new Map(), tables = [], shape = "", gathered = [], about = {}, edited = 0;
 
   const send = (key, value, joins, refused) =>
@@ -20,7 +20,7 @@ function fieldsPanel({list, filter, only, count}, {said, say}) {
   }
 
   function show() {
-    const now = gathered.map(({key, table}) => `${table} ${key}`).join("\n");
+    const now = gathered.map(({key, table, choices}) => `${table} ${key} ${choices}`).join("\n");
     if (now !== shape) build();
     shape = now;
     for (const field of gathered) {
@@ -34,6 +34,23 @@ function fieldsPanel({list, filter, only, count}, {said, say}) {
     }
     sift();
   }
+
+  // How many texts stand in fields that the file's reader refused: no answer is of them.
+  function refusals() {
+    const all = [...rows.values()].filter(row => row.isRefused());
+    refused.hidden = all.length === 0;
+    refused.textContent = filled(all.length === 1 ? said.one_refused : said.refused, {count: all.length});
+    told(all.length);
+  }
+
+  refused.addEventListener("click", () => {
+    const first = [...rows.values()].find(row => row.isRefused());
+    filter.value = "";
+    only.checked = false;
+    sift();
+    first.row.closest("details").open = true;
+    first.input.focus();
+  });
 
   // The rows of a file of another shape; what is being typed in goes, what is focused stays.
   function build() {
@@ -55,9 +72,9 @@ function fieldsPanel({list, filter, only, count}, {said, say}) {
         wasOpen.set(name, (first === 0 && fields.length <= MOST_OPEN) || OPEN.includes(name));
       }
       place.open = wasOpen.get(name);
-      for (const {key} of fields) {
-        const row = fieldRow(key, name, {said, send});
-        rows.set(key, row);
+      for (const field of fields) {
+        const row = fieldRow(field, {said, send, changed: refusals});
+        rows.set(field.key, row);
         place.append(row.row);
       }
       place.addEventListener("toggle", () => { if (!sifting()) wasOpen.set(name, place.open); });
@@ -65,6 +82,7 @@ function fieldsPanel({list, filter, only, count}, {said, say}) {
     });
     list.replaceChildren(...tables.map(({place}) => place));
     if (focused && rows.has(focused.dataset.key)) rows.get(focused.dataset.key).input.focus();
+    refusals();
   }
 
   // Which tables are open while nothing is looked for.
@@ -107,6 +125,7 @@ function fieldsPanel({list, filter, only, count}, {said, say}) {
     take,
     taken() { for (const row of rows.values()) row.taken(); },
     lost() { for (const row of rows.values()) row.lost(); },
+    takeBack() { for (const row of rows.values()) row.takeBack(); },
     // Look for the fields of a parameter.
     find(words) {
       filter.value = words;

@@ -83,9 +83,10 @@ async function startStudio() {
     return there;
   };
   const fields = fieldsPanel(
-    {list: find("fields"), filter: find("filter"), only: find("only"), count: find("count")},
-    {said, say: (message, refused) => socket.say(message, refused)});
-  const changes = changesBar(find, {said, say, refused: notify});
+    {list: find("fields"), filter: find("filter"), only: find("only"), count: find("count"),
+      refused: find("refused")},
+    {said, say: (message, refused) => socket.say(message, refused), told: count => changes.refused(count)});
+  const changes = changesBar(find, {said, say, refused: notify, takeBack: fields.takeBack});
   const asked = dialogs(find, {said, say, place: host});
   const dof = count => count === state.machine.commanded.length ? state.machine.commanded
     : state.machine.components;

@@ -11,6 +11,7 @@ REPORT := build/planar_two_slider.html
 MADE := $(VENV)/.made
 PACKAGE := $(VENV)/.package
 TOOLS := $(VENV)/.tools
+BUILDERS := $(VENV)/.builders
 KLIPPER := build/klipper/.made
 CONSTRAINTS := build/constraints.txt
 RELEASE_TOOLS := build/release/tools/.made
@@ -230,17 +231,23 @@ $(MADE):
 	@touch $@
 
 # The kernel is compiled with all optimisation; the Python sources are used where they lie.
-$(PACKAGE): $(MADE) pyproject.toml $(CONSTRAINTS) $(RUST_SOURCES) $(if $(KERNEL),,kernel-missing) | cargo
-	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) maturin
+$(PACKAGE): $(BUILDERS) pyproject.toml $(RUST_SOURCES) $(if $(KERNEL),,kernel-missing) | cargo
 	VIRTUAL_ENV=$(abspath $(VENV)) PIP_CONSTRAINT=$(abspath $(CONSTRAINTS)) \
 		$(BIN)/maturin develop --release --locked --extras report,netcdf,studio
 	$(BIN)/python -m compileall -q python/truepose
 	@touch $@
 
-# The same bytes from the same module: gzip -n writes neither name nor time.
-$(WEB_KERNEL): $(RUST_SOURCES) .cargo/config.toml
+# zopfli writes what gzip reads, a twentieth smaller than gzip -9: it stands in every page. Neither name nor time is in it.
+$(WEB_KERNEL): $(RUST_SOURCES) .cargo/config.toml | $(BUILDERS)
 	cargo build --profile web --package truepose-web --target $(WEB_TARGET) --target-dir target --locked
-	gzip -9 -n -c target/$(WEB_TARGET)/web/truepose_web.wasm > $@
+	$(BIN)/python -c 'import sys, zopfli.gzip as of; sys.stdout.buffer.write(of.compress(sys.stdin.buffer.read()))' \
+		< target/$(WEB_TARGET)/web/truepose_web.wasm > $@.new
+	mv $@.new $@
+
+# What the two kernels are made into packages with.
+$(BUILDERS): $(MADE) $(CONSTRAINTS)
+	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) maturin zopfli
+	@touch $@
 
 # Has an environment of its own: zig takes 300 MB.
 $(RELEASE_TOOLS): $(MADE) release/requirements.txt

@@ -67,7 +67,7 @@ impl Run {
             let message = "a variable that correlates with others is of Student's distribution";
             return fault("not-drawn", "bundle.copula", message);
         }
-        let known = placed.shifts(condition, bundle.sources.iter());
+        let known = placed.shifts(condition, &bundle.sources);
         let (joints, status) = placed.sent(condition, &known);
         if status[0] != Status::Ok {
             return fault("no-pose", "request.pose", status[0].name());

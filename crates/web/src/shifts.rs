@@ -9,11 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 impl Placed<'_> {
     /// What is known of the machine at the poses, of some of the live sources together.
-    pub fn shifts<'b>(
-        &self,
-        condition: &Condition,
-        sources: impl Iterator<Item = &'b Source>,
-    ) -> Moved {
+    pub fn shifts(&self, condition: &Condition, sources: &[Source]) -> Moved {
         let mut terms = Vec::new();
         let mut under = Under::default();
         let mut playing = BTreeSet::new();

@@ -2,7 +2,7 @@
 
 use super::{Farthest, Search, Set};
 use crate::batch::for_chunks;
-use crate::dispatch::{Work, dispatch};
+use crate::dispatch::{Work, dispatch_seldom};
 use crate::scalar::Real;
 use crate::spatial::Vector;
 
@@ -41,7 +41,7 @@ pub fn largest_of(count: usize, of: &Largest<'_>, out: &mut [f64]) {
     let width = NUMBERS * of.quantities.len();
     let mut nothing = vec![(); count];
     for_chunks(count, (out, width), (&mut [], 0), &mut nothing, |first, out, _, _| {
-        dispatch(Chunk { of, first, out });
+        dispatch_seldom(Chunk { of, first, out });
     });
 }
 

@@ -58,9 +58,7 @@ pub struct Search {
 
 impl Search {
     /// The farthest point of a set; no number where the set has a part that is none.
-    // Inlined for its instruction set; WebAssembly has one, and a module that is smaller with one copy.
-    #[cfg_attr(not(target_family = "wasm"), inline(always))]
-    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[inline(always)]
     pub fn farthest<S: Real>(&mut self, set: &Set) -> Farthest {
         let mut farthest = Farthest::default();
         if set.segments.is_empty() && set.ellipsoids.is_empty() {

@@ -31,7 +31,7 @@ impl<'a> Asked<'a> {
     fn read(request: &Given<'_>, bundle: &'a Bundle) -> Answer<Asked<'a>> {
         let placed = Placed::read_one(request, bundle)?;
         let condition = Condition::read(request, bundle)?;
-        let known = placed.shifts(&condition, bundle.sources.iter());
+        let known = placed.shifts(&condition, &bundle.sources);
         let (joints, sent) = placed.sent(&condition, &known);
         let (errors, status) = placed.errors(&joints, &known, &sent);
         let swing = placed.half_widths(&condition);

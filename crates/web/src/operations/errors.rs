@@ -17,7 +17,7 @@ pub fn errors(state: &mut State, request: &Given<'_>) -> Answer<Value> {
     let placed = Placed::read(request, &bundle)?;
     let condition = Condition::read(request, &bundle)?;
     let (count, width) = (placed.count, bundle.components.len());
-    let known = placed.shifts(&condition, bundle.sources.iter());
+    let known = placed.shifts(&condition, &bundle.sources);
     let (mut joints, sent) = placed.sent(&condition, &known);
     let (errors, status) = placed.errors(&joints, &known, &sent);
     let mut reply = Map::new();
@@ -25,7 +25,7 @@ pub fn errors(state: &mut State, request: &Given<'_>) -> Answer<Value> {
         let mut by_source = Map::new();
         for source in &bundle.sources {
             // Each as if it were the only one: where the command is corrected, corrected for it alone.
-            let own = placed.shifts(&condition, std::iter::once(source));
+            let own = placed.shifts(&condition, std::slice::from_ref(source));
             let (joints, sent) = placed.sent(&condition, &own);
             let (errors, _) = placed.errors(&joints, &own, &sent);
             by_source.insert(source.name.clone(), rows(&errors, count, width));

@@ -17,12 +17,13 @@ pub fn largest(state: &mut State, request: &Given<'_>) -> Answer<Value> {
     let placed = Placed::read_one(request, &bundle)?;
     let condition = Condition::read(request, &bundle)?;
     let swing = placed.half_widths(&condition);
-    let (together, status) = longest(&placed, &condition, &swing, bundle.sources.iter());
+    let (together, status) = longest(&placed, &condition, &swing, &bundle.sources);
     let mut reply = Map::new();
     if request.is_asked("sources")? {
         let mut by_source = Map::new();
         for source in &bundle.sources {
-            let (alone, _) = longest(&placed, &condition, &swing, std::iter::once(source));
+            let alone = std::slice::from_ref(source);
+            let (alone, _) = longest(&placed, &condition, &swing, alone);
             by_source.insert(source.name.clone(), alone);
         }
         reply.insert("by_source".to_owned(), Value::Object(by_source));
@@ -33,14 +34,14 @@ pub fn largest(state: &mut State, request: &Given<'_>) -> Answer<Value> {
 }
 
 /// Lengths by quantity of some sources as if they were the only ones, null where there is no error.
-fn longest<'a>(
+fn longest(
     placed: &Placed<'_>,
     condition: &Condition,
     swing: &[f64],
-    sources: impl Iterator<Item = &'a Source> + Clone,
+    sources: &[Source],
 ) -> (Value, Status) {
     let bundle = placed.bundle;
-    let known = placed.shifts(condition, sources.clone());
+    let known = placed.shifts(condition, sources);
     let (joints, sent) = placed.sent(condition, &known);
     let (centre, mut status) = placed.errors(&joints, &known, &sent);
     let own: Vec<f64> = bundle
@@ -49,7 +50,7 @@ fn longest<'a>(
         .zip(swing)
         .map(|(column, &swing)| {
             let source = &bundle.unknowns[column.variable].source;
-            if sources.clone().any(|one| one.name == *source) { swing } else { 0.0 }
+            if sources.iter().any(|one| one.name == *source) { swing } else { 0.0 }
         })
         .collect();
     let mut lengths = vec![f64::NAN; NUMBERS * bundle.quantities.len()];

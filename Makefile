@@ -47,8 +47,9 @@ demo: package ## build, evaluate the planar machine and write its report
 package: $(PACKAGE) web ## build the kernel and install truepose into .venv
 
 # Without Rust's library for it a checkout does without, and its reports are static; the CI does not.
+# The environment is made before the make within is started: two makes side by side would both make it.
 .PHONY: web
-web: cargo ## build the kernel for pages, where Rust has its target: rustup target add wasm32-unknown-unknown
+web: cargo $(BUILDERS) ## build the kernel for pages, where Rust has its target: rustup target add wasm32-unknown-unknown
 	@if [ -d "$$(rustc --print target-libdir --target $(WEB_TARGET))" ]; then \
 		$(MAKE) --no-print-directory $(WEB_KERNEL); \
 	else \

@@ -97,6 +97,7 @@ COUNT = """async ([data, colours]) => {
 # Seconds.
 PATIENCE = 20
 
+TWO_FRAMES = "() => new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))"
 WIDTHS = "() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
 
 
@@ -125,9 +126,7 @@ class Visit(Heard):
         last = monotonic() + PATIENCE
         while True:
             place.scroll_into_view_if_needed()
-            # Two frames: the browser has drawn what came into view.
-            self.page.evaluate("() => new Promise(r => requestAnimationFrame(() => "
-                               "requestAnimationFrame(r)))")  # fmt: skip
+            self.page.evaluate(TWO_FRAMES)  # what came into view is drawn
             picture = base64.b64encode(place.screenshot()).decode()
             found: dict[str, Any] = self.page.evaluate(COUNT, [picture, colours])
             if until(found) or monotonic() > last:
@@ -271,6 +270,7 @@ def test_nothing_serious_keeps_people_from_reading(width: int, scheme: str, repo
 
     report.page.set_viewport_size({"width": width, "height": 900})
     report.page.emulate_media(color_scheme=scheme)
+    report.page.evaluate(TWO_FRAMES)  # the page knows of its width
     wide, window = report.page.evaluate(WIDTHS)
     violations = Axe().run(report.page).response["violations"]
     report.page.emulate_media(color_scheme="light")

@@ -121,12 +121,17 @@
     saved(file, tableData(header, Array.from(table.tBodies[0].rows, cells)));
   }
 
-  // The keyboard goes to a table only where there is something to scroll.
-  function focusWide() {
-    for (const each of document.querySelectorAll(".scroll")) {
-      if (each.scrollWidth > each.clientWidth + 1) each.tabIndex = 0;
-      else each.removeAttribute("tabindex");
-    }
+  // The keyboard goes to a table only where there is something to scroll: in a wide window, or where
+  // its details are closed, there is not. The live part's tables change, and are reached always.
+  function followWidths() {
+    const observer = new ResizeObserver(() => {
+      for (const each of tables) {
+        if (each.scrollWidth > each.clientWidth + 1) each.tabIndex = 0;
+        else each.removeAttribute("tabindex");
+      }
+    });
+    const tables = document.querySelectorAll(".scroll:not([data-live])");
+    for (const each of tables) observer.observe(each);
   }
 
   function followPlace() {
@@ -166,9 +171,7 @@
 
   async function start() {
     followPlace();
-    focusWide();
-    addEventListener("resize", focusWide);
-    document.addEventListener("toggle", focusWide, true);
+    followWidths();
     if (forPrint) unfold();
     // The live part, where there is one, comes first: plotly.js keeps the page busy.
     if (typeof liveStarted !== "undefined") await liveStarted;

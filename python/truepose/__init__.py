@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from truepose.reporting.check import check
     from truepose.reporting.compare import compare
     from truepose.reporting.report import report
+    from truepose.studies.study import study
     from truepose.uncertainty_analysis.bounds import bounds
     from truepose.uncertainty_analysis.functions.inputs import Input
     from truepose.uncertainty_analysis.monte_carlo import monte_carlo
@@ -69,6 +70,7 @@ _WHERE = {
     "report": "truepose.reporting.report",
     "shares": "truepose.uncertainty_analysis.shares",
     "strain": "truepose.error_budget.strain",
+    "study": "truepose.studies.study",
     "threads": "truepose._kernel",
     "tightening": "truepose.verdict.tightening",
     "uncertainty": "truepose.uncertainty_analysis.uncertainty",
@@ -109,6 +111,7 @@ __all__ = [
     "report",
     "shares",
     "strain",
+    "study",
     "threads",
     "tightening",
     "uncertainty",

@@ -99,11 +99,11 @@ def _pairs(
     settings: Mapping[str, str] | Sequence[str], problems: list[Problem]
 ) -> Iterable[tuple[str, str]]:
     if isinstance(settings, Mapping):
-        yield from ((_unquoted(str(path)), str(text)) for path, text in settings.items())
+        yield from ((unquoted(str(path)), str(text)) for path, text in settings.items())
         return
     for setting in settings:
         path, equals, text = setting.partition("=")
-        path = _unquoted(path)
+        path = unquoted(path)
         if not equals or not all(path.split(".")):
             problems.append(
                 Problem(
@@ -117,7 +117,8 @@ def _pairs(
         yield path, text.strip()
 
 
-def _unquoted(path: str) -> str:
+def unquoted(path: str) -> str:
+    """A key without the quotation marks that may stand round its parts."""
     return _QUOTED.sub(r"\2", path.strip())
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -25,15 +26,34 @@ class FileKind:
     ending: str
 
 
+_HELD: ContextVar[Mapping[str, bytes] | None] = ContextVar("files that are held", default=None)
+
+
+@contextmanager
+def held(contents: Mapping[str, bytes]) -> Iterator[None]:
+    """Inside, files at these paths have these contents, whatever is on the disk, if anything is.
+
+    So what was read once is evaluated again, also where its files are not.
+    """
+    token = _HELD.set(contents)
+    try:
+        yield
+    finally:
+        _HELD.reset(token)
+
+
 def read_text(path: Path, kind: FileKind) -> tuple[bytes, str]:
     """Bytes and UTF-8 text of a file, without a byte order mark.
 
     Inside of a set of files that is being written, one of these is read as it will be; standard
-    input is read once, however often it is asked for. Raises
+    input is read once, however often it is asked for, and what is `held` not at all. Raises
     `MachineFileError` (file-missing, file-is-directory, file-unreadable, file-too-large, not-utf8),
     `RequestError` (output-is-input) for a file that this run is to write.
     """
     file = str(path)
+    kept = (_HELD.get() or {}).get(file)
+    if kept is not None:
+        return kept, _decoded(kept, file)
     stands = standing_for(path)
     if stands == path and not is_stdin(path):
         reads(path)

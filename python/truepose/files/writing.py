@@ -38,6 +38,23 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
 
 
 def _require_writable(path: Path, endings: Collection[str], inputs: Collection[Path]) -> None:
+    _require_place(path, endings)
+    if any(path.exists() and source.exists() and path.samefile(source) for source in inputs):
+        raise _refusal(
+            Fault(
+                "output-is-input",
+                "the output would write over the machine file",
+                found=str(path),
+                expected="another file",
+            ),
+            path,
+        )
+    _require_ordinary(path)
+    _require_open(path)
+
+
+def _require_place(path: Path, endings: Collection[str]) -> None:
+    """Refuse a name that cannot be one, or another ending, or a folder that is not there."""
     if "\0" in str(path):
         raise OSError(errno.EINVAL, "a name with a null character")
     ending = path.suffix.lower()
@@ -63,17 +80,11 @@ def _require_writable(path: Path, endings: Collection[str], inputs: Collection[P
             ),
             path,
         )
-    if any(path.exists() and source.exists() and path.samefile(source) for source in inputs):
-        raise _refusal(
-            Fault(
-                "output-is-input",
-                "the output would write over the machine file",
-                found=str(path),
-                expected="another file",
-            ),
-            path,
-        )
-    _require_ordinary(path)
+
+
+def _require_open(path: Path) -> None:
+    """Refuse a name in a folder that nothing may be written into."""
+    folder = Path(os.path.realpath(path)).parent
     if not os.access(folder, os.W_OK | os.X_OK):
         raise _refusal(
             Fault(
@@ -84,6 +95,26 @@ def _require_writable(path: Path, endings: Collection[str], inputs: Collection[P
             ),
             path,
         )
+
+
+def require_own_place(path: Path, ending: str) -> None:
+    """Refuse the name of a store, which is a folder, before the work is done.
+
+    Raises `RequestError` (codes `output-ending`, `output-not-writable`).
+    """
+    with _refused(path):
+        _require_place(path, [ending])
+        if (path.exists() or path.is_symlink()) and not path.is_dir():
+            raise _refusal(
+                Fault(
+                    "output-not-writable",
+                    "what stands there is a file, and a store is a folder",
+                    found=kind_of(path.stat().st_mode) or "a file",
+                    expected="a name that is free, or a store",
+                ),
+                path,
+            )
+        _require_open(path)
 
 
 def require_new(path: Path) -> None:
@@ -209,7 +240,7 @@ class FileSet:
             with _refused(self._asked[target]):
                 _on_disk(temporary, os.O_RDWR)
                 _take_over(temporary, target)
-        with _uninterrupted():
+        with uninterrupted():
             self._rename()
         for folder in {target.parent for target in self._temporary}:
             with suppress(OSError):  # not every file system can
@@ -355,7 +386,7 @@ class _Before:
 
 
 @contextmanager
-def _uninterrupted() -> Iterator[None]:
+def uninterrupted() -> Iterator[None]:
     """Ctrl-C waits until the block is done, which takes some microseconds."""
     if threading.current_thread() is not threading.main_thread():
         yield  # it goes to the main thread only

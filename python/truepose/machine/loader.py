@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -190,6 +191,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         calibration=validated.table(CalibrationTable),
         controller_holds=None if controller is None else controller.holds,
         family=family,
+        path=os.path.abspath(document.file),  # noqa: PTH100  links stay
     )
 
 

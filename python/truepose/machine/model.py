@@ -118,6 +118,9 @@ class Machine(Represented):
     family: FamilyParameters | None = None
     """What the file's `[family]` says; None where it has none."""
 
+    path: str = ""
+    """Where the file was read, from the root of the file system; it says nothing of the machine."""
+
     forward: OfJoints = field(init=False, repr=False)
     inverse: OfPoses = field(init=False, repr=False)
     sensitivity: OfPoses = field(init=False, repr=False)
@@ -189,8 +192,11 @@ class Machine(Represented):
 
     def _compared(self) -> list[Any]:
         """All that makes the machine, in a form that can be compared: the kernel's by its parts."""
+        apart = ("kernel", "path")
         others = [
-            getattr(self, each.name) for each in fields(self) if each.init and each.name != "kernel"
+            getattr(self, each.name)
+            for each in fields(self)
+            if each.init and each.name not in apart
         ]
         return [self.kernel.__reduce__()[1], *others]
 

@@ -37,11 +37,6 @@ ELLIPSE_SAMPLES = 10_000
 SEED = 0
 """Of the report, so that the same file gives the same page."""
 
-COVERAGE = 0.95
-"""At which the report says how far off the tool is over the workspace."""
-MOST_POSES, MOST_DRAWS = 3, 10_000
-"""For that: it is a number, no answer; `[accuracy] at` takes all poses and as many as decide."""
-
 UNITS = {"monte_carlo": "samples", "ellipses": "samples"}
 """What is counted in the progress of a result, where not poses."""
 
@@ -239,10 +234,11 @@ def _at_95(study: Study, watcher: Watcher) -> tuple[Answer, ...]:
     The verdict's, where it is at that coverage.
     """
     from truepose.verdict.accuracy import at_coverage
+    from truepose.verdict.coverage import QUICK, QUICK_DRAWS, QUICK_POSES
     from truepose.verdict.states import Population
 
     machine = study.machine
-    if machine.accuracy.at == COVERAGE:
+    if machine.accuracy.at == QUICK:
         return study.accuracy
     with watcher.progress("coverage") as report:
         population = Population(machine, progress=report)
@@ -251,10 +247,10 @@ def _at_95(study: Study, watcher: Watcher) -> tuple[Answer, ...]:
                 population,
                 state,
                 kind,
-                COVERAGE,
+                QUICK,
                 None,
-                most_poses=MOST_POSES,
-                most_draws=MOST_DRAWS,
+                most_poses=QUICK_POSES,
+                most_draws=QUICK_DRAWS,
             )
             for state in STATES
             for kind in quantities(machine.components)

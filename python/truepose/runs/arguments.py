@@ -173,6 +173,10 @@ _CALLABLE: Kind = (callable, "a function of what is done and of how much there i
 KINDS: dict[str, Kind] = {
     "Machine": _MACHINE,
     "Machine | Callable[..., Any]": _LATER,
+    "Machine | str | Path": (
+        lambda value: isinstance(value, Machine) or _path(value),
+        "the name of a machine file, or a machine as truepose.load returns it",
+    ),
     "Any": _LATER,
     "Correlation": _LATER,
     "Measurements | str | Path": (
@@ -200,6 +204,7 @@ KINDS: dict[str, Kind] = {
     "Sequence[str]": _NAMES,
     "Iterable[str]": _NAMES,
     "str | Path": _PATH,
+    "str | Path | None": _or_none(_PATH),
     "str | PathLike[str]": _PATH,
     "str | PathLike[str] | None": _or_none(_PATH),
     "str": _TEXT,

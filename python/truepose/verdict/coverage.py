@@ -50,6 +50,11 @@ NARROW = 0.02
 MOST_POSES = 1_000
 """Poses that are sampled at most, those of the largest first-order numbers."""
 
+QUICK = 0.95
+QUICK_POSES, QUICK_DRAWS = 3, 10_000
+"""At which coverage, and with how much effort, a number is told that is no answer: how far off the
+tool is over the workspace. An `[accuracy] at` takes all poses and as many draws as decide."""
+
 TOGETHER = 8_000_000
 """Lengths kept at once."""
 

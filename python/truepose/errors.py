@@ -158,6 +158,13 @@ CATALOGUE: dict[str, str] = {
     "unknown-kind": "a kind of machine that is not in the library",
     "no-family": "joint centres are to follow from a family, in a file without one",
     "unknown-code": "a code to be explained that nothing gives",
+    # studies
+    "bad-vary": "a variable of a study that cannot be read, or that changes the poses",
+    "bad-design": "a design of a study without what it needs, or with what it does not take",
+    "bad-reach": "a share of the poses that no variant can be asked for",
+    "study-too-large": "a study of more variants than are allowed",
+    "other-study": "a store that holds another study than the one that is asked for",
+    "store-in-use": "a store of a study that another process writes to",
     # controllers
     "unknown-controller": "a controller that there is no adapter for",
     "bad-option": "an option of a controller's adapter that it does not have or cannot read",

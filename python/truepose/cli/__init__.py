@@ -34,6 +34,7 @@ COMMANDS: dict[str, str] = {
     "shares": "truepose.cli.shares",
     "over-time": "truepose.cli.over_time",
     "strain": "truepose.cli.strain",
+    "study": "truepose.cli.study",
     "report": "truepose.cli.report",
     "live": "truepose.cli.live",
     "studio": "truepose.cli.studio",

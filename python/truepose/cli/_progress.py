@@ -106,7 +106,7 @@ def estimate(what: str, done: int, total: int, unit: str, seconds: float, first:
     """
     said = []
     if done >= 1 and total >= 1:
-        said.append(f"about {_clock(seconds / done * total)} for {_short(total)} {unit}")
+        said.append(f"about {clock(seconds / done * total)} for {_short(total)} {unit}")
     if first:
         said.append(f"{first} first; Ctrl-C gives what is done by then")
     return f"{what}: {', '.join(said)}"
@@ -121,7 +121,7 @@ def state(done: int, total: int | None, unit: str, seconds: float) -> str:
     said = f"{much}, {_short(rate)}/s"
     if total is None or done >= total:
         return said
-    return f"{said}, {_clock((total - done) / rate)} left"
+    return f"{said}, {clock((total - done) / rate)} left"
 
 
 def _short(number: float) -> str:
@@ -133,7 +133,7 @@ def _short(number: float) -> str:
     return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
     """Minutes and seconds, "0:29", or hours as well, "1:02:09"."""
     whole = round(seconds)
     minutes, rest = divmod(whole, 60)

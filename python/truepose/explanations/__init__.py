@@ -34,6 +34,7 @@ TOPICS: dict[str, str] = {
     "programs": "Programs of G-code",
     "machine_tests": "Tests of a machine",
     "parts": "Features of a part",
+    "studies": "Studies",
 }
 """Name of a table beside this file -> its title, in the order of the page."""
 

@@ -113,8 +113,8 @@ class AccuracyVerdict(StudiedQuantity):
             return np.array([[getattr(one, name).value for one in row] for row in given])
 
         words = [[one.answer or "" for one in row] for row in given]
-        found = {name: numbers(name) for name in ("witness", "linear", "bound")}
-        return {"answer": np.array(words, object), **found}
+        sizes = {name: numbers(name) for name in ("witness", "linear", "bound")}
+        return {"answer": np.array(words, object), **sizes}
 
 
 class SourceShares(StudiedQuantity):

@@ -25,7 +25,7 @@ from truepose.arrays import Flags
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import counted
 from truepose.files.writing import uninterrupted
-from truepose.studies.block import FILL, NOT_COMPUTED, Arrays
+from truepose.studies.block import FILL, NOT_COMPUTED, Arrays, schema_of
 from truepose.studies.dataset import BLOCK, DONE, KEY, PLAN_HASH, done_variable
 from truepose.studies.plan import StudyPlan
 
@@ -154,12 +154,15 @@ class StudyStore:
 
         with xr.open_zarr(self.path, consolidated=False) as opened:
             loaded = opened.load()
-        # Zarr's strings, which depend on the version of NumPy, are Python's.
-        names = [str(n) for n, one in loaded.variables.items() if one.dtype.kind in "TO"]
-        words = {name: loaded[name].astype(object) for name in names}
-        coords = {name: word for name, word in words.items() if name in loaded.coords}
-        read: xr.Dataset = loaded.assign_coords(coords)
-        return read.assign({name: word for name, word in words.items() if name not in coords})
+        schema = schema_of(tuple(self.key["quantities"]))
+        read: xr.Dataset = loaded[[*schema, DONE]]
+        # Zarr's strings, whose type depends on the version of NumPy, are Python's.
+        words = {
+            n: one.astype(object) for n, one in read.variables.items() if one.dtype.kind == "T"
+        }
+        coords = {name: word for name, word in words.items() if name in read.coords}
+        results = {name: word for name, word in words.items() if name not in read.coords}
+        return read.assign_coords(coords).assign(results)
 
     def sweep(self) -> None:
         """Remove the files that a lost process had not written whole."""

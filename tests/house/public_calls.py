@@ -197,6 +197,13 @@ def strain() -> None:
     expect(xr.Dataset, tp.strain(tp.load(MACHINES / "overconstrained.toml")))
 
 
+@use("study")
+def study() -> None:
+    varied = {"condition.temperature": "20,30 degC"}
+    result = tp.study(MACHINES / "planar_two_slider.toml", varied, quantities=["error"])
+    expect(xr.Dataset, result)
+
+
 @use("threads")
 def threads() -> None:
     assert tp.threads() >= 1

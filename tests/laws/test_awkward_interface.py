@@ -109,6 +109,13 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "plan": (
         tp.plan, {"machine": MACHINE, "instrument": instrument(), "budget": 3, "starts": 1},
     ),
+    "study": (
+        tp.study,
+        {
+            "machine": MACHINES / "planar_two_slider.toml",
+            "vary": ["condition.temperature=20,30 degC"], "quantities": ["error"],
+        },
+    ),
     "import_machine": (tp.import_machine, {"path": "none.cfg"}),
     "oddities": (tp.oddities, {"machine": MACHINE}),
     "tightening": (tp.tightening, {"machine": MACHINE}),

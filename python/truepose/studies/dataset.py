@@ -29,6 +29,12 @@ if TYPE_CHECKING:
 DONE = "done"
 """The variable that says which variants stand in a store, whole."""
 
+COORDS = (
+    "variant", "variable", "variable_units", "setting", "value", "quantity", "quantity_units",
+    "state", "source",
+)  # fmt: skip
+"""All coordinates that a study may have, in their order."""
+
 KEY, PLAN_HASH, BLOCK = "study", "plan_hash", "block"
 """Attributes: what makes it this study (JSON), SHA-256 of its plan, variants of a block."""
 
@@ -104,4 +110,13 @@ def done_variable(done: np.ndarray) -> xr.Variable:
     )
 
 
-__all__ = ["BLOCK", "DONE", "KEY", "PLAN_HASH", "done_variable", "labels_of", "results_of"]
+__all__ = [
+    "BLOCK",
+    "COORDS",
+    "DONE",
+    "KEY",
+    "PLAN_HASH",
+    "done_variable",
+    "labels_of",
+    "results_of",
+]

@@ -142,8 +142,8 @@ def _too_large(total: int, how: str) -> RequestError:
     )
 
 
-def _bad_design(message: str, found: str, expected: str) -> RequestError:
-    return RequestError(Problem("bad-design", message, found=found, expected=expected))
+def _bad_design(message: str, given: str, expected: str) -> RequestError:
+    return RequestError(Problem("bad-design", message, found=given, expected=expected))
 
 
 __all__ = ["DESIGNS", "FACTORIAL", "LATIN_HYPERCUBE", "MOST_VARIANTS", "SOBOL", "laid_out"]

@@ -9,13 +9,17 @@ from __future__ import annotations
 import errno
 import os
 import socket
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from truepose.errors import Problem, RequestError
 
-_HELD_BY_OTHERS = (errno.EACCES, errno.EAGAIN)
+_HELD_BY_OTHERS = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
+
+_BEHIND = 4096
+"""Where Windows locks a byte, which nobody else reads then: behind all that is written."""
 
 
 def lock_file(store: Path) -> Path:
@@ -34,6 +38,7 @@ def only_writer(store: Path) -> Iterator[None]:
     handle = _locked(path, store)
     try:
         os.ftruncate(handle, 0)
+        os.lseek(handle, 0, os.SEEK_SET)
         os.write(handle, f"{os.getpid()} {socket.gethostname()}\n".encode())
         yield
     finally:
@@ -43,33 +48,43 @@ def only_writer(store: Path) -> Iterator[None]:
 
 
 def _locked(path: Path, store: Path) -> int:
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        raise _cannot_lock(store, "a system without flock") from None
     while True:
         try:
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as failure:
             raise _cannot_lock(store, failure.strerror or str(failure)) from failure
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(handle)
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), path.stat()):
                     return handle
         except OSError as failure:
-            told = _told(handle)
+            writer = _writer(handle)
             os.close(handle)
             if failure.errno in _HELD_BY_OTHERS:
-                raise _in_use(store, told) from None
+                raise _in_use(store, writer) from None
             raise _cannot_lock(store, failure.strerror or str(failure)) from failure
         os.close(handle)  # its writer removed it meanwhile: it is nobody's
 
 
-def _told(handle: int) -> str:
+def _lock(handle: int) -> None:
+    """Raises `OSError` where another process has it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        os.lseek(handle, _BEHIND, os.SEEK_SET)
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _writer(handle: int) -> str:
     """Which process has the lock, as it has written there."""
-    with suppress(OSError, ValueError):
-        words = os.pread(handle, 1000, 0).decode("utf-8", "replace").split()
+    with suppress(OSError):
+        os.lseek(handle, 0, os.SEEK_SET)
+        words = os.read(handle, 1000).decode("utf-8", "replace").split()
         if len(words) == 2:
             return f"process {words[0]} on {words[1]}"
     return "another process"
@@ -95,7 +110,7 @@ def _cannot_lock(store: Path, why: str) -> RequestError:
             "the store cannot be locked against a second writer",
             file=str(store),
             found=why,
-            expected="a folder that may be written to, on a file system with locks (flock)",
+            expected="a folder that may be written to, on a file system with locks",
         )
     )
 

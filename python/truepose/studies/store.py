@@ -25,8 +25,9 @@ from truepose.arrays import Flags
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import counted
 from truepose.files.writing import uninterrupted
+from truepose.runs.dataset import labelled_dataset
 from truepose.studies.block import FILL, NOT_COMPUTED, Arrays, schema_of
-from truepose.studies.dataset import BLOCK, DONE, KEY, PLAN_HASH, done_variable
+from truepose.studies.dataset import BLOCK, COORDS, DONE, KEY, PLAN_HASH, done_variable
 from truepose.studies.plan import StudyPlan
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ class StudyStore:
         chunk = self.path / name / "c" / str(number)
         for file in [chunk] if chunk.is_file() else chunk.rglob("*"):
             if file.is_file():
-                handle = os.open(file, os.O_RDONLY)
+                handle = os.open(file, os.O_RDWR)
                 try:
                     os.fsync(handle)
                 finally:
@@ -154,15 +155,15 @@ class StudyStore:
 
         with xr.open_zarr(self.path, consolidated=False) as opened:
             loaded = opened.load()
-        schema = schema_of(tuple(self.key["quantities"]))
-        read: xr.Dataset = loaded[[*schema, DONE]]
         # Zarr's strings, whose type depends on the version of NumPy, are Python's.
-        words = {
-            n: one.astype(object) for n, one in read.variables.items() if one.dtype.kind == "T"
+        variables = {
+            str(name): one.astype(object) if one.dtype.kind == "T" else one
+            for name, one in loaded.variables.items()
         }
-        coords = {name: word for name, word in words.items() if name in read.coords}
-        results = {name: word for name, word in words.items() if name not in read.coords}
-        return read.assign_coords(coords).assign(results)
+        order = (*schema_of(tuple(self.key["quantities"])), DONE)
+        coords = {name: variables[name] for name in COORDS if name in variables}
+        data = {name: variables[name] for name in order}
+        return labelled_dataset(data, coords, loaded.attrs)
 
     def sweep(self) -> None:
         """Remove the files that a lost process had not written whole."""

@@ -112,14 +112,14 @@ def read_varied(vary: Mapping[str, str] | Sequence[str], machine: Machine) -> tu
 
 
 class _UnreadableError(Exception):
-    def __init__(self, text: str, message: str, found: str, expected: str, hint: str = "") -> None:
+    def __init__(self, text: str, message: str, given: str, expected: str, hint: str = "") -> None:
         super().__init__(message)
         shown = text if len(text) <= 80 else text[:77] + "..."
-        self.problem = _bad(f"--vary {shown}: {message}", found, expected, hint or None)
+        self.problem = _bad(f"--vary {shown}: {message}", given, expected, hint or None)
 
 
-def _bad(message: str, found: str, expected: str, hint: str | None = None) -> Problem:
-    return Problem("bad-vary", message, found=found, expected=expected, hint=hint)
+def _bad(message: str, given: str, expected: str, hint: str | None = None) -> Problem:
+    return Problem("bad-vary", message, found=given, expected=expected, hint=hint)
 
 
 def _read(text: str, machine: Machine) -> Iterator[VariedKey]:

@@ -47,6 +47,7 @@ def test_every_command_that_writes_is_killed() -> None:
     writes_the_same_way = {"compare", "over-time", "strain"}  # their one file by `deliver`
     writes_the_same_way |= {"schema"}  # its one file as `init` does, and never another content
     writes_the_same_way |= {"studio"}  # what is saved as `init` does; tests/studio kills it
+    writes_the_same_way |= {"study"}  # its store, which tests/unit/studies kills
     writes_nothing = {"explain", "completion"}
     written = set(ALL) - writes_the_same_way - writes_nothing
     assert {name.split()[0] for name in COMMANDS} == written

@@ -34,6 +34,15 @@ COMPUTING: dict[str, tuple[str, ...]] = {
     "part": ("part", "m.toml", "part.ngc", "--features", "part.toml", "--samples", "50"),
     "gcode": ("gcode", "m.toml", "part.ngc", "--dry-run"),
     "export": ("export", "c", "m.toml"),
+    "study": (
+        "study",
+        "m.toml",
+        *QUICK,
+        "--vary",
+        "condition.temperature=20,30 degC",
+        "-o",
+        "s.zarr",
+    ),
 }
 IMPORTING = "import"
 """Computes little, but reads files whose hashes count."""

@@ -112,10 +112,14 @@ def test_a_variant_that_nothing_acts_on_fails_so(tmp_path: Path) -> None:
     )
     machine = tmp_path / "m.toml"
     machine.write_text(text)
-    study = tp.study(machine, ["condition.force={},{x=100}"])
-    assert study["status"].values.tolist() == ["failed", "ok"]
-    assert study["code"].values.tolist() == ["no-source", ""]
-    assert study["reach"].values.tolist() == [1.0, 1.0]
+    # What acts on no machine of the base may act on a variant.
+    pulled = tp.study(machine, ["condition.force={},{x='100 N'}"])
+    assert pulled["status"].values.tolist() == ["ok", "ok"]
+    assert pulled["known"].values[:, 0].tolist()[0] == 0.0 < pulled["known"].values[1, 0]
+    still = tp.study(machine, ["strut.*.length=500,380 mm"])
+    assert still["status"].values.tolist() == ["failed", "infeasible"]
+    assert still["code"].values.tolist() == ["no-source", ""]
+    assert still["reach"].values.tolist()[0] == 1.0
 
 
 def test_a_base_without_poses_is_no_base() -> None:

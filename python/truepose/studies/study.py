@@ -424,7 +424,8 @@ def estimated(prepared: PreparedStudy) -> StudyCost:
     size, files = 0, 0
     for values in [*arrays.values(), np.zeros(len(rows), np.bool_)]:
         a_chunk = _bytes(values) * block / len(rows)
-        size += blocks * ON_DISK * (1 + int(a_chunk // ON_DISK))
+        folders = max(values.ndim - 1, 0)  # a chunk lies in one for each dim but its last
+        size += blocks * ON_DISK * (1 + int(a_chunk // ON_DISK) + folders)
         files += blocks
     written = sum(len(text) + 4 for row in settings for text in row) * count // len(rows)
     size += written + plan.values.nbytes + len(arrays) * ON_DISK

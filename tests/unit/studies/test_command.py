@@ -10,6 +10,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,7 @@ import pytest
 import truepose as tp
 from command_line import MACHINES, PLANAR, call
 from sweeps import sweep
+from truepose.cli import _progress
 from truepose.cli import study as command
 from truepose.reporting import variants
 
@@ -104,7 +107,7 @@ def test_a_dry_run_says_how_many_how_long_how_large(
     assert 0.0 < float(told["seconds"]) < 600.0
     call(capsys, *STUDY, "--output", store)
     files = [path for path in store.rglob("*") if path.is_file()]
-    size = sum(-(-path.stat().st_size // 4096) * 4096 for path in files)
+    size = sum(-(-path.stat().st_size // 4096) * 4096 for path in store.rglob("*"))
     assert 0.5 * size < int(told["bytes"]) < 2.0 * size
     assert 0.5 * len(files) < int(told["files"]) < 2.0 * len(files)
 
@@ -189,6 +192,33 @@ def test_a_study_of_the_hexapod_by_latin_hypercube(store: Path, capsys: Capture)
     )  # fmt: skip
     assert stored["done"].all()
     assert sorted(stored["setting"].values[:, 1].tolist()) == ["invar"] * 2 + ["steel"] * 2
+
+
+def test_progress_counts_what_is_left(
+    store: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its rate and the time left, as all long work (`cli._progress`)."""
+    told: list[tuple[int, int]] = []
+    what: list[tuple[str, str]] = []
+
+    @contextmanager
+    def progress(name: str, unit: str) -> Iterator[Callable[[int, int], None]]:
+        what.append((name, unit))
+
+        def report(done: int, total: int) -> None:
+            told.append((done, total))
+            if (done, total) == (3, 6):
+                raise KeyboardInterrupt
+
+        yield report
+
+    monkeypatch.setattr(_progress, "progress", progress)
+    outcome = call(capsys, *STUDY, "--output", store)
+    assert (outcome.code, outcome.out) == (130, "")
+    assert f"Interrupted: 2 of 6 variants stand in {store}" in outcome.err
+    assert call(capsys, *STUDY, "--output", store).code == 0
+    assert what == [("study", "variants")] * 2
+    assert told == [(1, 6), (2, 6), (3, 6), (1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_help_names_every_quantity_and_design() -> None:

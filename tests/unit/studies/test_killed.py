@@ -1,8 +1,8 @@
 """Killed at random moments, a study goes on, and in the end has what an undisturbed one has.
 
 That is the same hash over all decoded arrays, coordinates and the plan. Moments are drawn from a
-seed: any moment of the run, and moments within the milliseconds in which a block is written, which
-the command tells us. `make test` kills six times, `make test-all` twenty times more.
+seed: any moment of half a run, and moments within the milliseconds in which a block is written,
+which the command tells us. `make test` kills six times, `make test-all` twenty times more.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ import hashlib
 import os
 import random
 import select
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from command_line import PLANAR
@@ -27,8 +29,8 @@ xr = pytest.importorskip("xarray")
 pytest.importorskip("zarr")
 
 ARGUMENTS = [
-    "study", str(PLANAR), "--vary", "strut.*.length=380:520:8 mm",
-    "--vary", "condition.temperature=20,27,35 degC", "--output",
+    "study", str(PLANAR), "--vary", "strut.*.length=380:520:16 mm",
+    "--vary", "condition.temperature=20:35:4 degC", "--output",
 ]  # fmt: skip
 
 TELLING = """
@@ -47,7 +49,7 @@ main()
 """
 """The command line, which tells a pipe when a block is about to be written."""
 
-MOMENTS = 60e-3
+MOMENTS = 30e-3
 """s after that within which it is killed."""
 
 PATH = os.pathsep.join(str(Path(folder).resolve()) for folder in sys.path if folder)
@@ -96,12 +98,12 @@ def killed(store: Path, chance: random.Random, seconds: float, *, aimed: bool) -
     process = started(store, mouth)
     os.close(mouth)
     if aimed:
-        for _ in range(chance.randint(1, 4)):
+        for _ in range(chance.randint(1, 2)):
             select.select([ears], [], [], 120.0)
             os.read(ears, 1)  # nothing where it ended before
-        time.sleep(MOMENTS * chance.random() ** 2)
+        time.sleep(MOMENTS * chance.random())
     else:
-        time.sleep(seconds * chance.random())
+        time.sleep(0.5 * seconds * chance.random())
     alive = process.poll() is None
     process.send_signal(signal.SIGKILL)
     process.communicate()
@@ -110,18 +112,17 @@ def killed(store: Path, chance: random.Random, seconds: float, *, aimed: bool) -
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, float]:
-    """Hash of a run that nothing disturbs, and how long it takes."""
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
+    """The store of a run that nothing disturbs, and how long it takes."""
     store = tmp_path_factory.mktemp("undisturbed") / "study.zarr"
-    seconds = finished(store)
-    return content_hash(store), seconds
+    return store, finished(store)
 
 
 @pytest.mark.parametrize("kills", thinned([6, 20]))
 def test_a_killed_study_goes_on_to_the_same_content(
-    kills: int, undisturbed: tuple[str, float], tmp_path: Path
+    kills: int, undisturbed: tuple[Path, float], tmp_path: Path
 ) -> None:
-    expected, seconds = undisturbed
+    whole, seconds = undisturbed
     store = tmp_path / "study.zarr"
     chance = random.Random(kills)  # noqa: S311
     alive = 0
@@ -129,21 +130,22 @@ def test_a_killed_study_goes_on_to_the_same_content(
         alive += killed(store, chance, seconds, aimed=number % 2 == 1)
         if store.exists():  # whatever its moment, what stands can be read
             content_hash(store)
-    assert alive >= min(kills, 3), "most kills are before the end"
+    assert alive >= kills // 3, "the kills came before the end"
     finished(store)
-    assert content_hash(store) == expected
+    assert content_hash(store) == content_hash(whole)
     assert not list(store.rglob("*.partial"))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["study.zarr"]
     assert not lock_file(store).exists()
 
 
-def test_another_content_has_another_hash(undisturbed: tuple[str, float], tmp_path: Path) -> None:
+def test_another_content_has_another_hash(undisturbed: tuple[Path, float], tmp_path: Path) -> None:
     import zarr
 
-    expected, _ = undisturbed
     store = tmp_path / "study.zarr"
-    finished(store)
-    assert content_hash(store) == expected
+    shutil.copytree(undisturbed[0], store)
+    expected = content_hash(store)
+    assert content_hash(undisturbed[0]) == expected
     group = zarr.open_group(str(store), mode="r+")
-    group["known"][23, 0] = group["known"][23, 0] * (1 + 1e-15)
+    known = float(group["known"][63, 0])
+    group["known"][63, 0] = known + np.spacing(known)
     assert content_hash(store) != expected

@@ -144,6 +144,39 @@ def test_the_verdict_is_that_of_the_function_and_of_the_report(saved: Saved) -> 
             assert row[name]["pose"] == number.pose.tolist()
 
 
+def test_the_witness_is_told_as_the_command_tells_it(saved: Saved, capsys: Capture) -> None:
+    *_, told = verdict(saved.question)
+    out = " ".join(call(capsys, "check", saved.path).out.split())
+    not_met = [row for row in told if row["answer"] == "NOT met"]
+    assert not_met
+    for row in not_met:
+        assert f"witness: {'; '.join(row['example']['causes'])}" in out
+    for row, answer in zip(told, tp.accuracy(tp.load(saved.path)), strict=True):
+        witness = answer.example
+        assert witness is not None
+        assert witness.joint_centres is not None
+        assert row["example"]["causes"] == witness.words()[1:]
+        assert row["example"]["status"] == "ok"
+        assert row["example"]["centres"] == witness.joint_centres.tolist()
+        moved = np.linalg.norm(row["example"]["moved"])
+        if row["quantity"] == "position":
+            assert moved == pytest.approx(row["witness"]["value"], rel=1e-14)
+    json.dumps(told, allow_nan=False)
+
+
+def test_a_machine_that_cannot_be_assembled_is_named_and_not_drawn() -> None:
+    wide = tp.load(
+        MACHINES / "planar_two_slider.toml", ["strut.1.length_tolerance=450", "accuracy.target=1 m"]
+    )
+    *_, told = verdict(Question(wide))
+    lost = [row["example"] for row in told if row["witness"]["value"] is None]
+    assert lost
+    for example in lost:
+        assert example["status"] != "ok"
+        assert example["causes"]
+        assert example["centres"] is example["moved"] is None
+
+
 def test_shares_are_those_of_the_command_at_that_pose(saved: Saved, capsys: Capture) -> None:
     told = shares_at_pose(saved.question)
     pose = saved.question.pose()

@@ -26,6 +26,7 @@ from truepose.studio.settings import Settings
 from truepose.uncertainty_analysis.shares import shares
 from truepose.verdict.accuracy import accuracy
 from truepose.verdict.answer import AFTER, BEFORE, Answer, Number
+from truepose.verdict.witness import Witness, in_space
 
 SEED = 0
 """Of the shares, as the report's: the same file gives the same numbers."""
@@ -208,7 +209,18 @@ def _answer(answer: Answer) -> dict[str, Any]:
         "rests_on": answer.rests_on,
         "poses_used": answer.poses_used,
         "poses_left_out": answer.poses_left_out,
+        "example": None if answer.example is None else _example(answer.example),
     }
+
+
+def _example(witness: Witness) -> dict[str, Any]:
+    """The witness as a machine: its causes in the command's words, and where it stands."""
+    _, *causes = witness.words()
+    drawn: dict[str, Any] = {"centres": None, "moved": None}
+    if witness.error is not None and witness.joint_centres is not None:
+        drawn["centres"] = witness.joint_centres.tolist()
+        drawn["moved"] = in_space(witness.machine.components, witness.error, "xyz").tolist()
+    return {"causes": causes, "status": witness.status, **drawn}
 
 
 def _number(number: Number) -> dict[str, Any]:

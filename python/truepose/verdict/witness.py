@@ -9,7 +9,7 @@ stands at which end, from where the force of unknown direction comes, at which p
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -28,6 +28,7 @@ from truepose.runs.poses import pose_in_words
 from truepose.runs.quantities import quantities
 from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock, acting
+from truepose.spatial import rotate_quaternions
 from truepose.verdict.states import AFTER, BEFORE
 
 NAMED = 4
@@ -131,6 +132,29 @@ class Witness(Represented):
         joints = np.asarray(self.joints, np.float64)[np.newaxis]
         first = np.zeros(1, np.intp)
         return PoseBlock(machine, machine.condition, pose, first, joints, placements)
+
+    @cached_property
+    def joint_centres(self) -> Floats | None:
+        """(n_strut, 2, 3) where this machine's joint centres are, base side first, base frame, m.
+
+        None of a machine that cannot be assembled.
+        """
+        if self.error is None:
+            return None
+        machine = self.machine
+        columns, values = self.moved
+        actual = machine.kernel.replace(
+            {
+                machine.parameters[column]: float(machine.nominal[column] + value)
+                for column, value in zip(columns.tolist(), values[0].tolist(), strict=True)
+            }
+        )
+        placement = self.block.placements.copy()
+        placement[:, :3] += in_space(machine.components, self.error, "xyz")
+        turned = in_space(machine.components, self.error, ("rx", "ry", "rz"))
+        placement[:, 3:] = rotate_quaternions(placement[:, 3:], turned[np.newaxis])
+        joints = np.asarray(self.joints, np.float64)[np.newaxis]
+        return np.asarray(actual.joint_centres(joints, placement)[0])
 
     @cached_property
     def _parts(self) -> Floats:
@@ -311,4 +335,10 @@ class Witness(Represented):
         }
 
 
-__all__ = ["AFTER", "BEFORE", "Cause", "Witness"]
+def in_space(components: Sequence[str], error: Floats, axes: Sequence[str]) -> Floats:
+    """(3,) the components of an error along three axes, zero where the tool cannot move."""
+    by_name = dict(zip(components, error.tolist(), strict=True))
+    return np.array([by_name.get(axis, 0.0) for axis in axes])
+
+
+__all__ = ["AFTER", "BEFORE", "Cause", "Witness", "in_space"]

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import truepose as tp
-from command_line import call
+from command_line import MACHINES, call
 from machine_texts import PLANAR, edited, load_text
+from sweeps import thinned
 from truepose.errors import MachineFileError, RequestError
 from truepose.verdict.states import AFTER, BEFORE, STATES
 
@@ -125,3 +126,38 @@ def test_where_normal_variables_are_taken_to_end_is_said(
     assert ends in " ".join(call(capsys, "bounds", path).out.split())
     for answer in tp.accuracy(load_text(tmp_path, PLANAR)):
         assert ";" not in answer.rests_on
+
+
+# --- the witness as a machine in space
+
+
+@pytest.mark.parametrize(
+    "name", thinned(["hexapod", "planar_two_slider", "linear_delta", "3prs"], {"planar_two_slider"})
+)
+def test_joint_centres_of_a_witness_are_those_of_its_forward_solution(name: str) -> None:
+    """Its centres follow from its error; here they follow from its joints, solved anew."""
+    machine = tp.load(MACHINES / f"{name}.toml")
+    for answer in tp.accuracy(machine):
+        witness = answer.example
+        assert witness is not None
+        columns, values = witness.moved
+        names = [machine.parameters[column] for column in columns]
+        actual = machine.replace(
+            dict(zip(names, (machine.nominal[columns] + values[0]).tolist(), strict=True))
+        )
+        joints = witness.joints[np.newaxis]
+        poses = actual.forward(joints, witness.pose)
+        there = actual.kernel.joint_centres(joints, actual.kernel.placement_of(poses))[0]
+        centres = witness.joint_centres
+        assert centres is not None
+        assert centres == pytest.approx(there, abs=1e-13)
+        assert np.abs(
+            centres - machine.kernel.joint_centres(joints, witness.block.placements)
+        ).max()
+
+
+def test_a_witness_that_cannot_be_assembled_is_nowhere(tmp_path: Path) -> None:
+    wide = edited(PLANAR, ("length_tolerance = [-0.3, 0.3]", "length_tolerance = 450"))
+    witness = tp.accuracy(load_text(tmp_path, wide))[0].example
+    assert witness is not None
+    assert witness.joint_centres is None

@@ -26,6 +26,9 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
   let job = before ? before.job : 0, asked = false, rest = null;
   // What is known of the state shown: `errors` and `status` by state at once, the rest by and by.
   let known = null;
+  // A machine that is drawn at its `pose` in place of what is known: `centres` of its joints, and how far
+  // its tool is `moved`.
+  let other = null;
 
   const controls = controlsOf({
     bundle, components, commanded, state, words, numbers, changed: () => changed(),
@@ -94,8 +97,11 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
       }
       Object.assign(picture, {centres: centres[0], tool: placements[0].slice(0, 3)});
     }
+    const isThere = picture.centres && other && other.pose.every((value, at) => value === state.pose[at]);
+    if (isThere) Object.assign(picture, {other: other.moved, actual: other.centres});
+    place.dataset.drawn = isThere ? "other" : "known";
     table.show(bySource, sizes, {before: null, after: null, ...known.errors});
-    const largest = Math.max(0, ...Object.values(picture.errors).filter(Boolean).map(
+    const largest = Math.max(0, ...[...Object.values(picture.errors), picture.other].filter(Boolean).map(
       error => Math.hypot(...error)));
     find("factor").textContent = filled(words.magnified, {factor: view.show(picture, largest)});
     find("outside").textContent = status[0] === "ok" ? "" : words.statuses[status[0]];
@@ -251,6 +257,13 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     update(moving);
   }
 
+  // Draws another machine at its pose in place of what is known of this one; null: none.
+  function overlay(machine) {
+    if (machine === other) return;
+    other = machine;
+    update(false);
+  }
+
   // Nothing of it runs any more; what the next part, of another machine, is to look like.
   function end() {
     clearTimeout(rest);
@@ -261,5 +274,5 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     return {state, quantity, job, view: view.kept(), map: map.kept()};
   }
 
-  return {update, show, end, numbers, get state() { return state; }};
+  return {update, show, overlay, end, numbers, get state() { return state; }};
 }

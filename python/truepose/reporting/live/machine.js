@@ -46,7 +46,7 @@ function machineView(canvas, {drawing, planar, box, grouped, before}) {
     const {project, rows, scale} = projection(width, height);
     if (!planar) axes(rows, height);
     if (!shown || !shown.centres) return;
-    const {centres, tool, actual, errors, ellipses} = shown;
+    const {centres, tool, actual, errors, ellipses, other} = shown;
     const lines = (points, ...look) => plane.line(points.map(project), ...look);
     for (const edge of box) lines(edge, "green", 1, {dash: [2, 3]});
     lines(drawing.frame, "strong", 4, {closed: true});
@@ -65,8 +65,9 @@ function machineView(canvas, {drawing, planar, box, grouped, before}) {
       const factor = magnification;
       const moved = centres.map((pair, strut) => pair.map((point, end) => point.map(
         (value, axis) => value + factor * (actual[strut][end][axis] - value))));
-      for (const pair of moved) lines(pair, "before", 1.5, {dash: [5, 4]});
-      lines(platform(moved), "before", 1.5, {dash: [5, 4], closed: true});
+      const colour = other ? "beyond" : "before";
+      for (const pair of moved) lines(pair, colour, 1.5, {dash: [5, 4]});
+      lines(platform(moved), colour, 1.5, {dash: [5, 4], closed: true});
     }
     for (const [base, end] of centres) {
       plane.dot(project(base), 3.5, "paper", "ink");
@@ -76,7 +77,7 @@ function machineView(canvas, {drawing, planar, box, grouped, before}) {
     for (const [name, ellipse] of Object.entries(ellipses)) {
       if (ellipse) drawEllipse(ellipse, tool, name, {project, rows, scale});
     }
-    for (const [name, error] of Object.entries(errors)) {
+    for (const [name, error] of [...Object.entries(errors), ["beyond", other]]) {
       if (!error) continue;
       plane.arrow(at, project(tool.map((x, axis) => x + magnification * error[axis])), name, 2.5);
     }

@@ -6,7 +6,8 @@ const WORD_OF = {met: "met", "NOT met": "missed", undecided: "open"};
 const WORST_ANSWER = ["missed", "open", "met"];
 const NUMBERS_OF_ANSWER = {witness: "found", linear: "linear", bound: "proven"};
 
-function answersPanel({cards, strip, largest}, {words, said, tell}) {
+// `draw`: a function that draws the witness of an answer, or null.
+function answersPanel({cards, strip, largest}, {words, said, tell, draw}) {
   const states = {before: words.as_commanded, after: words.compensated};
 
   // The word of a state by the answers of its quantities; null where it did not come yet.
@@ -44,12 +45,26 @@ function answersPanel({cards, strip, largest}, {words, said, tell}) {
       const why = answer.answer ? `${filled(said.rests, {answer: answered, on: answer.rests_on})} ` : "";
       host.append(element("p", {className: "rests"}, `${of}${why}${said.farthest_at} `,
         tell.goTo(answer.witness.pose)));
+      if (answer.example) host.append(witness(name, answer));
     }
     const [{poses_used: used, poses_left_out: out}] = answers;
     host.append(element("p", {className: "rests"}, out
       ? filled(said.poses_left_out, {count: tell.numbers.fixed(used, 0), out: tell.numbers.fixed(out, 0)})
       : filled(said.poses_used, {count: tell.numbers.fixed(used, 0)})));
     return host;
+  }
+
+  // Which machine is farthest off, as the command says it, and a button that draws it.
+  function witness(name, answer) {
+    const {causes, centres} = answer.example;
+    const line = element("p", {className: "rests"}, filled(said.witness, {causes: causes.join("; ")}));
+    line.dataset.of = `workspace.${name}.example.${answer.quantity}`;
+    if (draw && centres) {
+      const button = element("button", {type: "button", className: "go"}, said.draw_witness);
+      button.addEventListener("click", () => draw(answer));
+      line.append(" ", button);
+    }
+    return line;
   }
 
   function verdict(value) {

@@ -20,6 +20,11 @@ PLAIN = {
     "computing": "computing",
     "connecting": "connecting",
     "cut": "There is more; save the file to have all of it.",
+    "draw_witness": "Draw it",
+    "drawn_elsewhere": "That machine is drawn at its pose alone:",
+    "drawn_known": "what is known",
+    "drawn_there": "It is {size} off.",
+    "drawn_witness": "a machine found, {state}, {quantity}",
     "edits": "{count} values changed",
     "evaluate": "Evaluate",
     "expected": "expected: {expected}",
@@ -104,6 +109,7 @@ PLAIN = {
     "unknowns": "What was found",
     "weight": "weight",
     "where": "where",
+    "witness": "That machine: {causes}.",
 }
 
 ANSWERS = {

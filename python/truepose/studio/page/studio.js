@@ -44,6 +44,7 @@ async function startStudio() {
       live.take({bundle, drawing, planar, sources}, link.now);
       machine = text;
       if (engine) root.dataset.liveReady = "drawn";
+      if (told && drawn) drawn.again();
       place.dataset.machines = 1 + Number(place.dataset.machines || 0);
       notLive("");
     } catch (failure) {
@@ -72,8 +73,12 @@ async function startStudio() {
     components: () => state.machine.components, quantities: () => state.machine.quantities,
   };
   const standing = standingOf(status);
+  const drawn = engine && witnessDrawing(place, {
+    words, said, tell, part: () => live.part, go: pose => link.go(pose),
+  });
   const answers = answersPanel(
-    {cards: find("cards"), strip: find("strip"), largest: find("largest")}, {words, said, tell});
+    {cards: find("cards"), strip: find("strip"), largest: find("largest")},
+    {words, said, tell, draw: drawn && drawn.choose});
   for (const name of ["cards", "strip"]) standing.watch(find(name), "verdict");
   standing.watch(find("largest"), "known");
   standing.watch(place, "machine");
@@ -128,6 +133,7 @@ async function startStudio() {
       find("notice").textContent = "";
       find("condition").hidden = message.condition === null;
       link.heard(message);
+      if (drawn && !message.holds.includes("verdict")) drawn.stale();
       fields.taken();
       changes.heard(message);
       asked.heard(message);
@@ -153,6 +159,7 @@ async function startStudio() {
       } else if (answers[name]) {
         if (problems) answers.failed[name](problems);
         else answers[name](value);
+        if (drawn && name === "verdict") drawn.take(problems ? [] : value);
       }
       tabs.take(name, {value, problems});
     },

@@ -107,3 +107,13 @@ def is_place(key: str) -> bool:
     The origin is; every other vector is told from there, and only turns with the machine.
     """
     return key == "origin"
+
+
+def turned_alike(description: Mapping[str, Any], found: Vector, expected: Vector) -> Vector:
+    """(n_joint,) difference, of drives that turn to whole turns."""
+    difference = found - expected
+    for j, drive in enumerate(description["drives"]):
+        if turns(drive["kind"]):
+            turn = 2 * np.pi / drive["scale"]
+            difference[j] -= turn * np.round(difference[j] / turn)
+    return difference

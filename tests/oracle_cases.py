@@ -34,6 +34,22 @@ def pose_in_order(order: str, position: ArrayLike, angles: ArrayLike) -> NDArray
     return pose(position, rotation_in_order(order, angles))
 
 
+def dietmaier_text() -> str:
+    """Case D01 as a machine file in metres, which the source leaves without a unit."""
+    data = case("d01_dietmaier")
+    rows = zip(data["base_points"], data["platform_points"], strict=True)
+    tables = "".join(
+        f'[[drive]]\nname = "d{n}"\nkind = "telescopic"\ntravel = [0.1, 4]\n'
+        f'[[strut]]\nname = "{n}"\ndrive = "d{n}"\nbase = {base}\nplatform = {platform}\n'
+        for n, (base, platform) in enumerate(rows, 1)
+    )
+    dof = '["x", "y", "z", "a", "b", "c"]'
+    return (
+        f'schema = 1\n[units]\nlength = "m"\nangle = "rad"\n[machine]\nname = "Forty"\n'
+        f"dof = {dof}\n{tables}[workspace]\nposes = [[0, 0, 1, 0, 0, 0]]\n"
+    )
+
+
 def six_psu_deviations() -> dict[str, float]:
     """Identified minus nominal of case D09 in the kernel's parameters, m and rad.
 

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from truepose.reporting.check import check
     from truepose.reporting.compare import compare
     from truepose.reporting.report import report
+    from truepose.runs.forward_solutions import forward_solutions
+    from truepose.runs.working_modes import inverse_solutions
     from truepose.studies.study import study
     from truepose.uncertainty_analysis.bounds import bounds
     from truepose.uncertainty_analysis.functions.inputs import Input
@@ -61,7 +63,9 @@ _WHERE = {
     "compensate": "truepose.compensation.compensate",
     "correct_program": "truepose.controllers.gcode",
     "export": "truepose.controllers",
+    "forward_solutions": "truepose.runs.forward_solutions",
     "import_machine": "truepose.controllers",
+    "inverse_solutions": "truepose.runs.working_modes",
     "monte_carlo": "truepose.uncertainty_analysis.monte_carlo",
     "oddities": "truepose.plausibility",
     "over_time": "truepose.error_budget.over_time",
@@ -101,7 +105,9 @@ __all__ = [
     "correct_program",
     "errors",
     "export",
+    "forward_solutions",
     "import_machine",
+    "inverse_solutions",
     "load",
     "monte_carlo",
     "oddities",

@@ -125,6 +125,16 @@ def export() -> None:
     assert tp.export(small(), "c").files
 
 
+@use("forward_solutions")
+def forward_solutions() -> None:
+    assert len(tp.forward_solutions(small(), small().inverse(POSE), starts=50).poses) == 2
+
+
+@use("inverse_solutions")
+def inverse_solutions() -> None:
+    assert len(tp.inverse_solutions(small(), POSE).joints) == 4
+
+
 @use("import_machine")
 def import_machine() -> None:
     expect(tp.Machine, tp.import_machine(DATA / "printer.cfg").machine)

@@ -160,6 +160,8 @@ def functions() -> Iterator[str]:
             "load().condition": warming.condition,
             "Input": tp.Input.normal(1.0, 0.1),
             "accuracy": tp.accuracy(planar),
+            "forward_solutions": tp.forward_solutions(planar, [0.2, 0.2], starts=50),
+            "inverse_solutions": tp.inverse_solutions(planar, [0.3, 0.2]),
             "check": tp.check(planar),
             "compare": tp.compare(planar, planar),
             "report": tp.report(planar, Path(temporary) / "page.html"),

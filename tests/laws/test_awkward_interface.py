@@ -116,6 +116,10 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
             "vary": ["condition.temperature=20,30 degC"], "quantities": ["error"],
         },
     ),
+    "forward_solutions": (
+        tp.forward_solutions, {"machine": MACHINE, "joints": JOINTS[0], "starts": 10},
+    ),
+    "inverse_solutions": (tp.inverse_solutions, {"machine": MACHINE, "pose": POSE[0]}),
     "import_machine": (tp.import_machine, {"path": "none.cfg"}),
     "oddities": (tp.oddities, {"machine": MACHINE}),
     "tightening": (tp.tightening, {"machine": MACHINE}),

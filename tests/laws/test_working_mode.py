@@ -6,7 +6,7 @@ import copy
 
 import numpy as np
 
-from drive_kinds import is_strut, turns
+from drive_kinds import is_strut, turned_alike, turns
 from machine_under_test import OK, MachineUnderTest
 from reference_kinematics import Reference
 from truepose import _kernel
@@ -35,16 +35,6 @@ def test_the_other_working_mode_is_the_other_root(machine: MachineUnderTest) -> 
             assert np.abs(turned_alike(other, found, expected)).max() < CLOSED
     difference = np.abs(joints[status == OK] - machine.placed[0][status == OK]).max()
     assert one_root or difference > 0.1
-
-
-def turned_alike(description: dict, found: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """(n_joint,) difference, of drives that turn to whole turns."""
-    difference = found - expected
-    for j, drive in enumerate(description["drives"]):
-        if turns(drive["kind"]):
-            turn = 2 * np.pi / drive["scale"]
-            difference[j] -= turn * np.round(difference[j] / turn)
-    return difference
 
 
 def test_without_a_mode_the_root_nearest_mid_travel_at_home(machine: MachineUnderTest) -> None:

@@ -1,4 +1,4 @@
-"""The witness of the verdict in the studio: drawn where it is, told as the command tells it."""
+"""One machine of the studio: the witness drawn where it is, and its other solutions."""
 
 from __future__ import annotations
 
@@ -137,3 +137,30 @@ def test_another_machine_has_a_witness_of_its_own(visit: Visit) -> None:
     answer = answered("tolerance.strut.*.base.*=0.0009")["after.position"]
     assert select.input_value() == "after.position"
     assert listed(visit) == causes_of(answer) != before
+
+
+def test_other_solutions_are_those_of_the_function(visit: Visit) -> None:
+    page, machine = visit.page, tp.load(MACHINE)
+    page.locator("#tab-modes").click()
+    words = page.locator('[data-of="modes.words"]')
+    words.wait_for(timeout=PATIENCE)
+    visit.rest()
+    assert shown_pose(visit) == [0.0, 0.0, 20.0, 0.0, 0.0, 0.0]
+    pose = [0.0, 0.0, 20 * 0.0254, 0.0, 0.0, 0.0]
+    found = tp.forward_solutions(machine, machine.inverse(pose), pose)
+    assert words.inner_text() == (
+        f"{len(found.poses)} found from {found.starts} starts, of which {found.converged} "
+        "converged. Not proven complete: what no start reaches is not found."
+    )
+    for at in range(len(found.poses)):
+        assert visit.number(f"modes.{at + 1}.distance") == found.apart[at, 0]
+        assert visit.number(f"modes.{at + 1}.residual") == found.residual[at]
+    panel = page.locator("[data-tab=modes]")
+    assert "no other working mode" in panel.inner_text()
+    panel.locator("form input").fill("40")
+    panel.locator("form button").click()
+    words.filter(has_text="41 starts").wait_for(timeout=PATIENCE)
+    panel.locator("form input").fill("0")
+    panel.locator("form button").click()
+    problem = panel.locator(".problem").first
+    problem.filter(has_text="50000").wait_for(timeout=PATIENCE)

@@ -11,9 +11,13 @@ import pytest
 
 import truepose as tp
 from command_line import MACHINES, PLANAR
+from machine_texts import load_text
+from oracle_cases import case, dietmaier_text
+from oracle_cases import pose as pose_of
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import RequestError
 from truepose.studio.answers import DroppedFile, Question
+from truepose.studio.messages import fits
 from truepose.studio.settings import Settings
 from truepose.studio.tabs import TABS
 from truepose.studio.tabs.over_time import MOST_TIMES
@@ -124,3 +128,70 @@ def test_poses_to_measure_are_planned_with_the_instruments_of_the_file() -> None
         with pytest.raises(RequestError) as failure:
             asked(plan=count)
         assert failure.value.problems[0].code == "plan-budget"
+
+
+# --- other solutions
+
+
+@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "3prs"])
+def test_modes_are_those_of_the_functions(name: str) -> None:
+    machine = tp.load(MACHINES / f"{name}.toml")
+    pose = machine.poses()[1]
+    question = Question(machine, Settings((), tuple(pose.tolist())), options={"starts": 300})
+    told = only("modes", question)
+    reached = tp.inverse_solutions(machine, pose)
+    assert [row["mode"] for row in told["modes"]] == list(reached.working_modes)
+    assert [row["joints"] for row in told["modes"]] == reached.joints.tolist()
+    assert told["modes_left_out"] == 0
+    found = tp.forward_solutions(machine, machine.inverse(pose), reached.poses[0], starts=300)
+    forward = told["forward"]
+    assert (forward["starts"], forward["converged"]) == (301, found.converged)
+    assert forward["found"] == len(found.poses) > 1
+    assert [row["pose"] for row in forward["solutions"]] == found.poses.tolist()
+    assert forward["apart"] == found.apart.tolist()
+    for at, row in enumerate(forward["solutions"]):
+        assert found.in_workspace is not None
+        assert row["in_workspace"] is bool(found.in_workspace[at])
+        assert (row["status"], row["mode"]) == (found.status[at], found.working_modes[at])
+        assert row["residual"] == found.residual[at]
+        assert row["joint_residual"] == found.joint_residual[at]
+        others = [value for n, value in enumerate(found.apart[at].tolist()) if n != at]
+        assert (row["distance"], row["nearest"]) == (found.apart[at, 0], min(others))
+    # The pose shown is the first of them.
+    assert forward["solutions"][0]["distance"] == 0.0
+    columns = [machine.dof.index(freedom) for freedom in machine.commanded]
+    first = forward["solutions"][0]["pose"]
+    assert [first[column] for column in columns] == pytest.approx(pose.tolist(), abs=1e-12)
+    assert has_room(told)
+
+
+def has_room(told: Any) -> bool:
+    return fits({"type": "tab", "number": 1, "name": "modes", "value": told})
+
+
+def test_forty_solutions_fit_into_a_message(tmp_path: Path) -> None:
+    machine = load_text(tmp_path, dietmaier_text())
+    solution = case("d01_dietmaier")["computed_reference"]["solutions"][0]
+    pose = tuple(pose_of(solution[:3], np.array(solution[3:]).reshape(3, 3)).tolist())
+    told = only("modes", Question(machine, Settings((), pose), options={"starts": 20_000}))
+    assert (told["forward"]["found"], told["forward"]["left_out"]) == (40, 0)
+    assert has_room(told)
+
+
+def test_many_working_modes_are_counted() -> None:
+    machine = tp.load(MACHINES / "hexaglide.toml")
+    told = only("modes", Question(machine, options={"starts": 10}))
+    assert len(told["modes"]) + told["modes_left_out"] + told["modes_unsolved"] == 64
+    assert told["modes_left_out"] > 0
+    assert told["modes"][0]["status"] == "ok"
+
+
+def test_a_pose_that_no_joints_reach_has_no_solutions() -> None:
+    machine = tp.load(PLANAR)
+    told = only("modes", Question(machine, Settings((), (5.0, 5.0))))
+    assert (told["status"], told["modes"]) == ("unreachable", [])
+    assert "forward" not in told
+    for starts in (0, -1, 50_001, "many", True, 2.5, None):
+        with pytest.raises(RequestError) as failure:
+            only("modes", Question(machine, options={"starts": starts}))
+        assert failure.value.problems[0].code == "bad-argument"

@@ -188,6 +188,7 @@ KINDS: dict[str, Kind] = {
         "the name of a file of measurements, or what is read from it, or None",
     ),
     "Instrument | Iterable[Instrument]": _LATER,
+    "ArrayLike": _NUMBERS,
     "ArrayLike | None": _or_none(_NUMBERS),
     "Condition | None": _or_none(_CONDITION),
     "Progress | None": _or_none(_CALLABLE),

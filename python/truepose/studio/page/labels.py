@@ -7,7 +7,11 @@ from typing import Any
 from truepose.language import say
 
 PLAIN = {
+    "apart": "How far each is from each",
+    "apart_caption": "Far counts a rotation at the machine's characteristic length. Travel and "
+    "leaning are those of the joints at that pose; the workspace is between the ends of its poses.",
     "as_in_file": "As in the file",
+    "assembly_modes": "Forward solutions: where else these joints lead",
     "at_pose": "at the pose shown",
     "at_rest": "everything is answered",
     "budget_caption": "As `truepose budget` ranks them, over the poses of the file.",
@@ -42,9 +46,14 @@ PLAIN = {
     "forget": "Forget it",
     "found": "found: {found}",
     "found_value": "found",
+    "from_commanded": "from the pose shown",
+    "from_nearest": "from the nearest other",
     "go_there": "Show this pose",
     "highest_over": "highest over the workspace",
     "in_file": "in the file: {value}",
+    "in_workspace": "workspace",
+    "inside": "inside",
+    "joint_residual": "inverse misses the joints by",
     "largest_at": "{quantity}: largest {size}, at {time}.",
     "left_out": "Poses left out: {why}",
     "limits": "limits",
@@ -52,10 +61,18 @@ PLAIN = {
     "linear_share": "linear",
     "lost": "The studio does not answer; the page keeps trying. Start it again with the same file.",
     "measured_share": "measured",
+    "modes_caption": "The nominal machine at the pose shown: no tolerance, load or temperature.",
+    "modes_signs": "The first is the file's own. A sign for each drive, in their order: on which "
+    "side of its strut it stands; a point for a drive that has one side only.",
+    "modes_unsolved": "{count} other combinations do not reach the pose.",
     "no_answer": "no answer",
     "no_difference": "Nothing is changed.",
     "no_edits": "as in the file",
+    "no_joints": "No joint coordinates reach the pose shown.",
+    "no_modes": "There is no other working mode: every drive has one way to reach the pose.",
     "no_suspicions": "None.",
+    "not_complete": "{found} found from {starts} starts, of which {converged} converged. Not "
+    "proven complete: what no start reaches is not found.",
     "not_connected": "The studio does not answer: nothing was changed.",
     "not_in_file": "not in the file",
     "not_live": "There are no quick numbers: {why}.",
@@ -63,6 +80,7 @@ PLAIN = {
     "one_refused": "1 value refused",
     "other_condition": "{changed}; shown at other temperatures or another load",
     "or_drop": "or drop one here, at most 20 MB.",
+    "outside": "outside",
     "over_workspace": "largest over the workspace",
     "parameter": "parameter",
     "parameters_left_out": "{count} smaller ones are not shown.",
@@ -79,8 +97,10 @@ PLAIN = {
     "program": "Program",
     "quantity": "Quantity",
     "rank": "rank",
+    "reached": "starts that reach it",
     "reading": "reading",
     "report_command": "Its report by a command:",
+    "residual": "struts open by",
     "residual_after": "after the fit",
     "residual_before": "before",
     "residuals": "Residuals, over their uncertainty, the farthest off first",
@@ -90,14 +110,19 @@ PLAIN = {
     "rms_after": "{quantity} then known to, rms",
     "rows_left_out": "{count} more are not shown.",
     "saved": "Saved as {name}.",
+    "search_again": "Search",
     "shapley": "Shapley",
     "share": "share",
     "shares_caption": "Shares of the variance at the pose shown.",
+    "si_joint": "m or rad",
+    "solution": "number",
     "some_changed": "{count}, {changed} changed",
     "source_of": "source",
     "sources_caption": "Each source alone, as commanded; known error, and with its tolerances, to "
     "first order.",
     "spread": "{component} spreads by {size} (standard deviation) at the pose shown.",
+    "stands": "joints",
+    "starts": "Starts",
     "steps": "{count} steps",
     "suspicions": "Suspicions",
     "take_back": "take the change back ({before})",
@@ -110,6 +135,8 @@ PLAIN = {
     "weight": "weight",
     "where": "where",
     "witness": "That machine: {causes}.",
+    "working_mode": "working mode",
+    "working_modes": "Working modes: which joints reach this pose",
 }
 
 ANSWERS = {
@@ -122,10 +149,17 @@ ANSWERS = {
 TABS = {
     "budget": "Budget",
     "calibration": "Calibration",
+    "modes": "Modes",
     "over_time": "Over time",
     "part": "Part",
     "shares": "Shares",
     "sources": "Sources",
+}
+
+STANDINGS = {
+    "joint_limit": "a strut leans beyond its joint's limit",
+    "ok": "inside travel",
+    "out_of_travel": "beyond a drive's travel",
 }
 
 LINES = {
@@ -162,6 +196,7 @@ def labels() -> dict[str, Any]:
         **{name: say(PLAIN[name]) for name in PLAIN},
         "answers": {name: say(ANSWERS[name]) for name in ANSWERS},
         "tabs": {name: say(TABS[name]) for name in TABS},
+        "standings": {name: say(STANDINGS[name]) for name in STANDINGS},
         "lines": {name: say(LINES[name]) for name in LINES},
         "line_explained": {name: say(EXPLAINED[name]) for name in EXPLAINED},
         "weights": {name: say(WEIGHTS[name]) for name in WEIGHTS},

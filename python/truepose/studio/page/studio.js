@@ -1,7 +1,7 @@
 // The page of a studio: the live part with the file behind it. When the studio has told its state and
 // fields the root has `data-studio-ready`.
 
-const TABS = [sourcesTab, sharesTab, budgetTab, overTimeTab, partTab, calibrationTab];
+const TABS = [sourcesTab, sharesTab, budgetTab, overTimeTab, partTab, calibrationTab, modesTab];
 // Where a window keeps which tab it shows, for when the page is loaded again.
 const KEPT_TAB = "truepose studio tab", KEPT_HASH = "truepose studio file";
 

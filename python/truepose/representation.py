@@ -47,6 +47,11 @@ class Represented:
         return facts_html(type(self).__name__, self._facts())
 
 
+def attribute_text(text: str) -> str:
+    """A text as HTML has it between double quotes, as short as that can be."""
+    return text.replace("&", "&amp;").replace('"', "&quot;")
+
+
 LEFT = "text-align: left"
 """How words stand in a cell."""
 
@@ -97,4 +102,4 @@ def clipped(text: str, most: int) -> str:
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
-__all__ = ["LEFT", "Facts", "Represented", "clipped", "facts_html", "shown"]
+__all__ = ["LEFT", "Facts", "Represented", "attribute_text", "clipped", "facts_html", "shown"]

@@ -161,9 +161,10 @@ class Machine(Represented):
             ends.append(f"{name} {first} to {last} {unit.label}")
         return f"{', '.join(ends)}: {counted(len(poses), 'pose')}"
 
-    def plot(self, figure: str = "machine_drawing") -> Plotted:
-        """A figure of its report, which shows itself in a notebook: by default the machine drawn.
+    def plot(self, figure: str | None = None) -> Plotted:
+        """A figure of its report, which shows itself in a notebook.
 
+        Without a name it is the machine drawn, in place of which a notebook shows the live page.
         `figure` is a name such as "workspace_maps"; what the figure needs is computed. The result
         has the `figure` of plotly.js, and `write` writes it. Raises `RequestError` (extra-missing
         without the extra `report`, unknown-choice, no-workspace, no-source).

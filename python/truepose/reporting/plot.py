@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
@@ -30,6 +31,9 @@ MIME = "application/vnd.plotly.v1+json"
 HOW_SURE = ("sampled", "worst_case", "monte_carlo", "ellipses", "bounds", "shares")
 """Results that `assembly.with_how_sure` adds."""
 
+MACHINE = "machine_drawing"
+"""The figure of the machine itself."""
+
 BESIDE = "tp.report(machine, measurements=...).plot(...) has those of a calibration"
 
 
@@ -47,6 +51,8 @@ class MachinePlot(Represented):
     caption: str
     figure: dict[str, Any]
     drawn: DrawnFigure
+    is_live: bool = False
+    """Whether a notebook shows the live page of the machine in place of the figure."""
 
     def write(self, path: str | PathLike[str]) -> None:
         """Write a page that opens without a network, FILE.html, or the figure, FILE.json.
@@ -74,7 +80,12 @@ class MachinePlot(Represented):
         yield "how to read it", self.caption
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        """The figure for what draws it, and what it says for what does not."""
+        """The live page, or the figure for what draws it and what it says for what does not."""
+        if self.is_live:
+            page = module_that_draws("truepose.reporting.live.framed")
+            # Without a kernel for browsers, or of a machine that has no live part: the figure.
+            with suppress(RequestError):
+                return {"text/html": page.framed(self.machine), "text/plain": repr(self)}
         return {
             MIME: self.figure,
             "text/html": facts_html("MachinePlot", self._facts()),
@@ -83,11 +94,15 @@ class MachinePlot(Represented):
 
 
 @checked
-def plot(machine: Machine, figure: str = "machine_drawing") -> MachinePlot:
+def plot(machine: Machine, figure: str | None = None) -> MachinePlot:
     """A figure of the report of a machine, by its name; what it needs is computed.
+
+    Without a name the machine drawn, in place of which a notebook shows the live page.
 
     Raises `RequestError` (extra-missing, unknown-choice, no-source), and as `truepose.budget`.
     """
+    if figure is None:
+        return replace(plot(machine, MACHINE), is_live=True)
     module = _module_named(figure)
     needs: str | None = getattr(module, "NEEDS", None)
     if needs == "calibration":

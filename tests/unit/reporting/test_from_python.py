@@ -148,7 +148,7 @@ def test_what_a_report_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_figure_shows_itself_and_is_written(written: Any, tmp_path: Path) -> None:
-    shown = tp.load(PLANAR).plot()
+    shown = tp.load(PLANAR).plot("machine_drawing")
     bundle = shown._repr_mimebundle_()
     figure = bundle["application/vnd.plotly.v1+json"]
     assert json.loads(json.dumps(figure, allow_nan=False)) == figure

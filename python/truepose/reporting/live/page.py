@@ -15,18 +15,20 @@ if TYPE_CHECKING:
 ENDINGS = (".html",)
 
 
-def html(machine: Machine, beside: str | None = None, back: str | None = None) -> str:
+def html(
+    machine: Machine, beside: str | None = None, back: str | None = None, *, in_frame: bool = False
+) -> str:
     """The page as text.
 
     `beside`: the address of a script with the kernel (`part.shared_kernel`), which then is not in
-    the page. `back`: of the page that lists all of them. Raises `RequestError` (no-live-kernel),
-    and as `truepose.live.bundle`.
+    the page. `back`: of the page that lists all of them. `in_frame`: it tells the page around it
+    how high it is. Raises `RequestError` (no-live-kernel), and as `truepose.live.bundle`.
     """
     title = say("{machine} · live", machine=machine.name)
     return template("live/live_page.html.jinja").render(
         machine=machine,
         back=back,
-        **page_parts(title, live_of(machine, beside), figures=False),
+        **page_parts(title, live_of(machine, beside, in_frame=in_frame), figures=False),
     )
 
 

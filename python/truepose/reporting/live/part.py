@@ -34,6 +34,8 @@ PAGE = (
     "verdict.js", "cards.js", "ranking.js", "live.js", "start.js",
 )  # fmt: skip
 
+FRAMED = ("framed.js",)
+
 
 @dataclass(frozen=True)
 class LivePart:
@@ -90,14 +92,16 @@ def shared_kernel() -> str:
     return f'document.getElementById("live-kernel").textContent = "{packed_kernel()}";\n'
 
 
-def live_of(machine: Machine, beside: str | None = None) -> LivePart:
+def live_of(machine: Machine, beside: str | None = None, *, in_frame: bool = False) -> LivePart:
     """The live part of a machine in its file's condition; the kernel in it, or in `beside`.
+
+    `in_frame`: of a page in a frame, which says how high it is.
 
     Raises `RequestError` (no-live-kernel), and as `truepose.live.bundle` does.
     """
     from truepose.live import bundle
 
-    return live_part(machine, bundle(machine), beside)
+    return live_part(machine, bundle(machine), beside, in_frame=in_frame)
 
 
 def live_or_why_not(machine: Machine) -> LivePart | str:
@@ -115,13 +119,22 @@ def live_or_why_not(machine: Machine) -> LivePart | str:
         return say("This page has no live part: {reason}.", reason=problem.message)
 
 
-def live_part(machine: Machine, bundle: Mapping[str, Any], beside: str | None = None) -> LivePart:
+def live_part(
+    machine: Machine,
+    bundle: Mapping[str, Any],
+    beside: str | None = None,
+    *,
+    in_frame: bool = False,
+) -> LivePart:
     """The live part of a machine, whose data for the kernel is `bundle`; as `live_of`.
 
     Raises `RequestError` (no-live-kernel).
     """
     kernel = packed_kernel() if beside is None else ""
-    return assembled(kernel, machine_in_page(machine, bundle), beside=beside)
+    setting = machine_in_page(machine, bundle)
+    if in_frame:
+        return assembled(kernel, setting, _together(FRAMED), "startFramed", beside=beside)
+    return assembled(kernel, setting, beside=beside)
 
 
 def machine_in_page(machine: Machine, bundle: Mapping[str, Any]) -> dict[str, Any]:

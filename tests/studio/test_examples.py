@@ -1,4 +1,4 @@
-"""The examples of docs/how_to/studio.md, clicked through: each number of the page is the browser's."""
+"""The examples of docs/how_to/studio.md, clicked through: its numbers are those in the browser."""
 
 from __future__ import annotations
 
@@ -96,8 +96,9 @@ def test_which_tolerance_matters(browser: Any, tmp_path: Path) -> None:
         assert first.startswith("drive.")
         assert ".offset at its " in first
         turned = rows(text)
-        for row in turned:
-            page.locator("[data-studio=reset]").click()
+        for number, row in enumerate(turned):
+            if number:
+                page.locator("[data-studio=reset]").click()
             typed(visit, row["key"], row["value"])
             assert answer(visit) == (row["word"], row["size"])
         assert [row["word"] for row in turned] == ["NOT met", "NOT met", "met", "met"]

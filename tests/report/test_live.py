@@ -234,7 +234,7 @@ def test_in_another_language_why_is_said_in_it(browser: Any, tmp_path: Path) -> 
         assert source["why"] not in note
         assert live.setting["sources"][source["name"]]["why"] in note
     title = live.page.locator("tr[data-of=thermal] th").get_attribute("title")
-    assert title == live.setting["words"]["sources"]["thermal"]["doc"]
+    assert title == live.setting["sources"]["thermal"]["doc"]
     assert "Wärmeausdehnung" in str(title)
     assert live.complaints == []
     live.page.close()

@@ -34,7 +34,10 @@ NUMBER = """name => {
 }"""
 PIXELS = """name => document.querySelector(`#live [data-live="${name}"]`).toDataURL()"""
 SETTING = "() => document.getElementById('live-setting').textContent"
-SETTLED = "() => document.getElementById('live').dataset.settled === 'yes'"
+SETTLED = """() => {
+  const {settled, map} = document.getElementById("live").dataset;
+  return settled === "yes" && map === "fine";
+}"""
 WORD = """state => document.querySelector(`#live [data-of="${state}.verdict"]`).textContent"""
 
 
@@ -67,7 +70,7 @@ class LiveVisit(Heard):
         self.page.wait_for_function(later, arg=before, timeout=PATIENCE)
 
     def settle(self) -> None:
-        """Wait until the worker has told everything."""
+        """Wait until the worker has told everything, and the map is the fine one."""
         self.page.wait_for_function(SETTLED, timeout=PATIENCE)
 
     def number(self, name: str) -> float | None:

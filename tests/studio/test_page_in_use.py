@@ -523,7 +523,7 @@ def test_nothing_serious_keeps_people_from_using_it(width: int, scheme: str, vis
     visit.set("condition.temperature", "36")
     visit.find("")
     found = []
-    for tab in ("sources", "shares", "calibration", "part", "modes"):
+    for tab in ("sources", "shares", "calibration", "part", "studies", "modes"):
         page.locator(f"#tab-{tab}").click()
         visit.rest()
         found += Axe().run(page).response["violations"]

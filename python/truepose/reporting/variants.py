@@ -14,6 +14,7 @@ from truepose.reporting.display import column
 from truepose.reporting.result import Result
 from truepose.reporting.table import Table
 from truepose.studies.block import FAILED, INFEASIBLE, NOT_COMPUTED, OK
+from truepose.studies.ranking import causes, ranked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,33 +31,23 @@ _STATUS = ("variant", "status", "reach", "poses_lost", "first_lost", "code", "re
 def tables(machine: Machine, dataset: xr.Dataset) -> list[Table]:
     """How many variants there are of each status, the best of them, and why others are not ok."""
     shown = [_counts(dataset)]
-    best = best_variants(dataset)
+    best = ranked(dataset)[:MOST_SHOWN]
     if best.size:
         shown.append(_best(machine, dataset, best))
-    if reasons := _reasons(dataset):
+    if reasons := causes(dataset)[:MOST_SHOWN]:
         shown.append(
             Table(
                 "reasons",
                 "Not ok",
                 ("status", "variants", "first", "why"),
-                tuple(reasons),
+                tuple(
+                    (one.status, f"{one.count:,}", str(one.first), one.reason) for one in reasons
+                ),
                 words=1,
                 note="Of each cause the first variant, and what is said of it.",
             )
         )
     return shown
-
-
-def best_variants(dataset: xr.Dataset) -> Indices:
-    """Numbers of the variants that are ok, of the smallest linear maximum first, at most a few.
-
-    In the order of the plan where the study has no such number. Position comes before orientation.
-    """
-    fine = np.flatnonzero(dataset["status"].values == OK)
-    if "linear_maximum" in dataset:
-        sizes = dataset["linear_maximum"].values[fine, 0]
-        fine = fine[np.argsort(sizes, kind="stable")]
-    return fine[:MOST_SHOWN].astype(np.intp)
 
 
 def _counts(dataset: xr.Dataset) -> Table:
@@ -95,17 +86,6 @@ def _best(machine: Machine, dataset: xr.Dataset, best: Indices) -> Table:
     note = f"{best.size} of {every:,} variants that are ok, {how}." if every > best.size else ""
     rows = tuple(zip(*columns, strict=True))
     return Table("variants", "Variants", tuple(header), rows, words=words, note=note)
-
-
-def _reasons(dataset: xr.Dataset) -> list[tuple[str, str, str, str]]:
-    """Each cause with its count and its first variant, the most frequent first."""
-    status, codes = dataset["status"].values, dataset["code"].values
-    causes: dict[tuple[str, str], list[int]] = {}
-    for number in np.flatnonzero((status == INFEASIBLE) | (status == FAILED)).tolist():
-        causes.setdefault((str(status[number]), str(codes[number])), []).append(number)
-    rows = sorted(causes.items(), key=lambda cause: -len(cause[1]))[:MOST_SHOWN]
-    reasons = dataset["reason"].values
-    return [(word, f"{len(of):,}", str(of[0]), str(reasons[of[0]])) for (word, _), of in rows]
 
 
 def csv_text(machine: Machine, dataset: xr.Dataset) -> Iterator[str]:
@@ -149,4 +129,4 @@ def _line(cells: list[object] | list[str]) -> str:
     return buffer.getvalue()
 
 
-__all__ = ["best_variants", "csv_text", "tables"]
+__all__ = ["csv_text", "tables"]

@@ -200,7 +200,7 @@ def prepare(
     path = machine.path if isinstance(machine, Machine) else machine
     base, loaded = read_base(path, (*own, *given))
     if isinstance(machine, Machine):
-        _require_same(machine, base)
+        _require_same(machine, replace(base, settings=tuple(own)))
     varied = read_varied(vary, loaded)
     key = {
         "machine_hash": loaded.file_hash,

@@ -35,17 +35,36 @@ def to_read(folder: Path, name: str) -> Path:
     Raises `RequestError` (file-missing) for a name that leads anywhere else, as for a file that is
     not there: nothing is told of other folders.
     """
-    target = _target(folder, name)
-    inside = target is not None and real_path(target).is_relative_to(real_path(folder))
-    if target is None or not inside or not target.is_file():
-        raise RequestError(
-            Problem(
-                "file-missing",
-                "there is no such file in the machine file's folder",
-                found=name[:LONGEST_SHOWN],
-                expected="the name of a file in that folder, such as part.ngc",
-            )
+    target = _inside(folder, name)
+    if target is None or not target.is_file():
+        raise _missing(name, "file", "part.ngc")
+    return target
+
+
+def folder_to_read(folder: Path, name: str) -> Path:
+    """A folder in the folder, such as the store of a study, or in one below it. As `to_read`."""
+    target = _inside(folder, name)
+    if target is None or not target.is_dir() or real_path(target) == real_path(folder):
+        raise _missing(name, "store", "study.zarr")
+    return target
+
+
+def _missing(name: str, kind: str, example: str) -> RequestError:
+    return RequestError(
+        Problem(
+            "file-missing",
+            f"there is no such {kind} in the machine file's folder",
+            found=name[:LONGEST_SHOWN],
+            expected=f"the name of a {kind} in that folder, such as {example}",
         )
+    )
+
+
+def _inside(folder: Path, name: str) -> Path | None:
+    """The path, unless it leads out of the folder."""
+    target = _target(folder, name)
+    if target is None or not real_path(target).is_relative_to(real_path(folder)):
+        return None
     return target
 
 
@@ -63,4 +82,4 @@ def _target(folder: Path, name: str) -> Path | None:
     return target
 
 
-__all__ = ["to_read", "to_write"]
+__all__ = ["folder_to_read", "to_read", "to_write"]

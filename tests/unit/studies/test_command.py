@@ -22,6 +22,7 @@ from sweeps import sweep
 from truepose.cli import _progress
 from truepose.cli import study as command
 from truepose.reporting import variants
+from truepose.studies.ranking import ranked
 
 Capture = pytest.CaptureFixture[str]
 VARY = ("--vary", "strut.*.length=380,500,520 mm", "--vary", "condition.temperature=20,35 degC")
@@ -43,7 +44,7 @@ def test_the_table_has_the_best_variants_and_why_others_are_none(
     assert "ok 4" in lines
     assert "infeasible 2" in lines
     study = tp.study(PLANAR, VARY[1::2])
-    order = variants.best_variants(study).tolist()
+    order = ranked(study)[: variants.MOST_SHOWN].tolist()
     sizes = study["linear_maximum"].values[order, 0]
     assert sizes.tolist() == sorted(sizes)
     shown = [line for line in lines if line[:1].isdigit() and " mm " in line]

@@ -170,6 +170,7 @@ def test_a_machine_is_its_file_and_its_settings(tmp_path: Path) -> None:
     of_machine = tp.study(machine, vary)
     of_file = tp.study(file, vary, settings=["condition.temperature=25"])
     assert of_machine.identical(of_file)
+    assert tp.study(tp.load(file), vary, settings=["condition.temperature=25"]).identical(of_file)
     pulled = machine.condition.replace(force=(1.0, 0.0, 0.0))
     for other in (machine.replace({"tool.x": 1e-3}), machine.with_condition(pulled)):
         with pytest.raises(tp.errors.RequestError, match="machine-file-changed"):

@@ -9,7 +9,7 @@ import pytest
 
 import truepose as tp
 from command_line import MACHINES, PLANAR
-from truepose.reporting.variants import best_variants
+from truepose.studies.ranking import ranked
 
 DELTA = MACHINES / "rotary_delta.toml"
 SHORT = "strut.*.length=380 mm"
@@ -33,7 +33,7 @@ def test_shrinking_rods_never_improve_a_machine() -> None:
     assert min(alone) < fine.min()
     for name in ("known", "linear_maximum", "witness", "linear", "bound"):
         assert np.isnan(study[name].values[:first]).all(), name
-    assert int(best_variants(study)[0]) >= first
+    assert int(ranked(study)[0]) >= first
     assert float(study["linear_maximum"].sel(quantity="position").min()) == fine.min()
 
 

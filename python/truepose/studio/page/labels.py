@@ -124,6 +124,19 @@ PLAIN = {
     "stands": "joints",
     "starts": "Starts",
     "steps": "{count} steps",
+    "stores_left_out": "{count} more studies are not listed.",
+    "studies_caption": "Studies of `truepose study` in the folder of the machine file: many "
+    "variants, of which those that are ok are ranked by their linear maximum.",
+    "studies_none": "There is no study in the folder of the machine file. A command makes one:",
+    "study": "Study",
+    "study_dots": "Each dot is a variant, the large one the best; dashed is what the file shown asks.",
+    "study_other": "It is of another machine file, or the file was changed since: the numbers are "
+    "not those of the file shown.",
+    "study_set": "Set it",
+    "study_set_about": "Give the file these values, in place of all that is changed",
+    "study_statuses": "{variants} variants: {counts}.",
+    "study_causes": "Not ok",
+    "study_over": "Linear maximum of {quantity} over",
     "suspicions": "Suspicions",
     "take_back": "take the change back ({before})",
     "too_large": "The file is larger than 20 MB.",
@@ -132,6 +145,7 @@ PLAIN = {
     "uncertainty_before": "uncertainty before",
     "unknown": "unknown",
     "unknowns": "What was found",
+    "variant": "variant",
     "weight": "weight",
     "where": "where",
     "witness": "That machine: {causes}.",
@@ -154,6 +168,7 @@ TABS = {
     "part": "Part",
     "shares": "Shares",
     "sources": "Sources",
+    "studies": "Studies",
 }
 
 STANDINGS = {
@@ -190,6 +205,14 @@ PART_VERDICTS = {
 }
 
 
+STATUSES = {
+    "failed": "failed",
+    "infeasible": "infeasible",
+    "not computed": "not computed",
+    "ok": "ok",
+}
+
+
 def labels() -> dict[str, Any]:
     """All of it, in the language spoken."""
     return {
@@ -201,6 +224,7 @@ def labels() -> dict[str, Any]:
         "line_explained": {name: say(EXPLAINED[name]) for name in EXPLAINED},
         "weights": {name: say(WEIGHTS[name]) for name in WEIGHTS},
         "states": {name: say(STATES[name]) for name in STATES},
+        "study_status": {name: say(STATUSES[name]) for name in STATUSES},
         "part_verdicts": {name: say(PART_VERDICTS[name]) for name in PART_VERDICTS},
     }
 

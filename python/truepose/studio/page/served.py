@@ -23,8 +23,8 @@ SCRIPTS = (
     "socket.js", "standing.js", "shown.js", "without_kernel.js",
     "stepped.js", "field_row.js", "fields.js", "changes.js", "dialogs.js",
     "tables.js", "answers.js", "witness.js", "sources.js", "shares.js",
-    "budget.js", "over_time.js", "part.js", "dropped_files.js", "calibration.js", "modes.js",
-    "tabs.js", "studio.js",
+    "budget.js", "over_time.js", "part.js", "dropped_files.js", "calibration.js", "studies.js",
+    "modes.js", "tabs.js", "studio.js",
 )  # fmt: skip
 STYLE = "studio.css"
 

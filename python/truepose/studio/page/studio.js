@@ -1,7 +1,8 @@
 // The page of a studio: the live part with the file behind it. When the studio has told its state and
 // fields the root has `data-studio-ready`.
 
-const TABS = [sourcesTab, sharesTab, budgetTab, overTimeTab, partTab, calibrationTab, modesTab];
+const TABS = [sourcesTab, sharesTab, budgetTab, overTimeTab, partTab, calibrationTab, studiesTab,
+  modesTab];
 // Where a window keeps which tab it shows, for when the page is loaded again.
 const KEPT_TAB = "truepose studio tab", KEPT_HASH = "truepose studio file";
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from truepose.studio.answers import Question, Value
-from truepose.studio.tabs import budget, calibration, modes, over_time, part
+from truepose.studio.tabs import budget, calibration, modes, over_time, part, studies
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Tab:
 
 REGISTRY: tuple[Tab, ...] = tuple(
     Tab(module.NAME, module.FOLLOWS, module.give)
-    for module in (budget, over_time, part, calibration, modes)
+    for module in (budget, over_time, part, calibration, studies, modes)
 )
 
 TABS = {tab.name: tab for tab in REGISTRY}

@@ -1,0 +1,50 @@
+"""The best variants of a study, and why the others are not ok."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truepose.arrays import Indices
+from truepose.studies.block import FAILED, INFEASIBLE, OK
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Why variants are not ok: of which `status`, how many, the `first` and what is said of it."""
+
+    status: str
+    count: int
+    first: int
+    reason: str
+
+
+def ranked(dataset: xr.Dataset) -> Indices:
+    """Numbers of the variants that are ok, of the smallest linear maximum of the position first.
+
+    In the order of the plan where the study has no such number.
+    """
+    fine = np.flatnonzero(dataset["status"].values == OK)
+    if "linear_maximum" in dataset:
+        sizes = dataset["linear_maximum"].values[fine, 0]
+        fine = fine[np.argsort(sizes, kind="stable")]
+    return fine.astype(np.intp)
+
+
+def causes(dataset: xr.Dataset) -> list[Cause]:
+    """Each cause of variants that are not ok, the most frequent first."""
+    status, codes = dataset["status"].values, dataset["code"].values
+    found: dict[tuple[str, str], list[int]] = {}
+    for number in np.flatnonzero((status == INFEASIBLE) | (status == FAILED)).tolist():
+        found.setdefault((str(status[number]), str(codes[number])), []).append(number)
+    rows = sorted(found.items(), key=lambda cause: -len(cause[1]))
+    reasons = dataset["reason"].values
+    return [Cause(word, len(of), of[0], str(reasons[of[0]])) for (word, _), of in rows]
+
+
+__all__ = ["Cause", "causes", "ranked"]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Cause:
+class WhyNotOk:
     """Why variants are not ok: of which `status`, how many, the `first` and what is said of it."""
 
     status: str
@@ -36,7 +36,7 @@ def ranked(dataset: xr.Dataset) -> Indices:
     return fine.astype(np.intp)
 
 
-def causes(dataset: xr.Dataset) -> list[Cause]:
+def causes(dataset: xr.Dataset) -> list[WhyNotOk]:
     """Each cause of variants that are not ok, the most frequent first."""
     status, codes = dataset["status"].values, dataset["code"].values
     found: dict[tuple[str, str], list[int]] = {}
@@ -44,7 +44,7 @@ def causes(dataset: xr.Dataset) -> list[Cause]:
         found.setdefault((str(status[number]), str(codes[number])), []).append(number)
     rows = sorted(found.items(), key=lambda cause: -len(cause[1]))
     reasons = dataset["reason"].values
-    return [Cause(word, len(of), of[0], str(reasons[of[0]])) for (word, _), of in rows]
+    return [WhyNotOk(word, len(of), of[0], str(reasons[of[0]])) for (word, _), of in rows]
 
 
-__all__ = ["Cause", "causes", "ranked"]
+__all__ = ["WhyNotOk", "causes", "ranked"]

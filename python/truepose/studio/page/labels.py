@@ -129,7 +129,8 @@ PLAIN = {
     "variants, of which those that are ok are ranked by their linear maximum.",
     "studies_none": "There is no study in the folder of the machine file. A command makes one:",
     "study": "Study",
-    "study_dots": "Each dot is a variant, the large one the best; dashed is what the file shown asks.",
+    "study_dots": "Each dot is a variant, the large one the best; dashed is what the file shown "
+    "asks.",
     "study_other": "It is of another machine file, or the file was changed since: the numbers are "
     "not those of the file shown.",
     "study_set": "Set it",

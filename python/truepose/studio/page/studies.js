@@ -105,7 +105,7 @@ const studiesTab = {
       body.replaceChildren();
       figure.hidden = true;
       if (!stores.length) {
-        notes.append(element("p", {}, said.studies_none), element("pre", {},
+        notes.append(element("p", {}, said.studies_none), element("pre", {tabIndex: 0},
           `truepose study ${state.file.name} --vary "strut.*.stiffness=30:120:4 N/um" --output study.zarr`));
       }
       if (value.stores_left_out) {

@@ -330,31 +330,6 @@ def test_a_pose_is_gone_to_and_the_studio_answers_for_it(visit: Visit) -> None:
     assert quick == pytest.approx(visit.number("studio.largest.known.position"), abs=1e-12)
 
 
-def test_the_tab_of_the_budget_is_that_of_the_function(visit: Visit) -> None:
-    visit.page.locator("#tab-budget").click()
-    visit.page.wait_for_selector("[data-tab=budget] tbody tr", timeout=PATIENCE)
-    budget = tp.budget(tp.load(PLANAR))
-    for at, name in enumerate(budget["source"].values):
-        highest = float(budget["highest"].values[at, 0])
-        assert visit.number(f"budget.{name}.position") == pytest.approx(highest, rel=1e-12)
-    visit.page.locator("#tab-over_time").click()
-    problem = visit.page.locator("[data-tab=over_time] > .problem")
-    problem.filter(has_text="temperature").wait_for(timeout=PATIENCE)
-
-
-def test_every_tab_is_reached_by_arrow_keys(visit: Visit) -> None:
-    visit.page.locator("[role=tab][aria-selected=true]").focus()
-    seen = []
-    for _ in range(6):
-        visit.page.keyboard.press("ArrowRight")
-        seen.append(visit.page.evaluate("() => document.activeElement.id"))
-        panels = visit.page.locator("[role=tabpanel]:not([hidden])")
-        assert panels.count() == 1
-        assert panels.get_attribute("aria-labelledby") == seen[-1]
-    assert len(set(seen)) == 6
-    visit.rest()
-
-
 def test_a_dropped_file_of_measurements_is_answered(browser: Any, tmp_path: Path) -> None:
     data = MACHINES.parent / "examples" / "data"
     (tmp_path / "m").mkdir()

@@ -67,9 +67,7 @@ def test_error_over_time_is_that_of_the_function(folder: Path) -> None:
     largest = told["largest"]["position"]
     assert (largest["value"], times.index(largest["time"])) == (sizes.max(), sizes.argmax())
     assert largest["value"] == max(told["error"]["position"])
-    with pytest.raises(RequestError) as failure:
-        only("over_time", Question(tp.load(PLANAR)))
-    assert failure.value.problems[0].code == "no-temperature-log"
+    assert only("over_time", Question(tp.load(PLANAR))) == {}  # no log: nothing is wrong
 
 
 def test_the_part_is_that_of_the_function(folder: Path) -> None:
@@ -88,7 +86,13 @@ def test_the_part_is_that_of_the_function(folder: Path) -> None:
             assert state["known"] == float(there["known"])
             assert state["interval"] == [float(there["lower"]), float(there["upper"])]
     assert [row["feature"] for row in told["rows"]] == ["front"]
-    assert only("part", Question(machine, folder=folder)) == {}
+    (folder / "other.NC").write_text(PROGRAM)
+    names = {
+        "programs": ["other.NC", "part.ngc"],
+        "features_files": ["m.toml", "part.toml", "warm.toml"],
+    }
+    assert only("part", Question(machine, folder=folder)) == names
+    assert {name: told[name] for name in names} == names | {"programs": ["part.ngc"]}
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,10 @@ PLAIN = {
     "no_difference": "Nothing is changed.",
     "no_edits": "as in the file",
     "no_joints": "No joint coordinates reach the pose shown.",
+    "no_log": "The file has no temperature log. With `temperature_log` under `[condition]`, a CSV "
+    "of temperatures over time, the error over time stands here.",
     "no_modes": "There is no other working mode: every drive has one way to reach the pose.",
+    "no_programs": "There is no program in that folder.",
     "no_suspicions": "None.",
     "not_complete": "{found} found from {starts} starts, of which {converged} converged. Not "
     "proven complete: what no start reaches is not found.",
@@ -95,6 +98,7 @@ PLAIN = {
     "poses_left_out": "{count} poses; the machine cannot take {out} others.",
     "poses_used": "{count} poses.",
     "program": "Program",
+    "programs_there": "Programs there: {names}.",
     "quantity": "Quantity",
     "rank": "rank",
     "reached": "starts that reach it",

@@ -35,15 +35,19 @@ const overTimeTab = {
 
     select.addEventListener("change", draw);
     new ResizeObserver(draw).observe(chart);
+    const none = element("p", {className: "caption"}, said.no_log);
+    const choice = element("p", {className: "caption"}, element("label", {}, `${said.quantity} `, select));
+    const there = element("div", {}, choice, chart, words);
+    host.append(none, there);
     return {
       show(value) {
-        const first = shown === null, names = Object.keys(value.error);
-        shown = value;
-        if (first) {
-          select.append(...names.map(name => element("option", {value: name}, tell.quantity(name))));
-          host.append(element("p", {className: "caption"}, element("label", {}, `${said.quantity} `, select)),
-            chart, words);
-        }
+        none.hidden = Boolean(value.times);
+        there.hidden = !value.times;
+        shown = value.times ? value : null;
+        if (!shown) return;
+        const names = Object.keys(value.error), before = select.value;
+        select.replaceChildren(...names.map(name => element("option", {value: name}, tell.quantity(name))));
+        select.value = names.includes(before) ? before : names[0];
         words.replaceChildren(...names.map(name => element("p", {className: "caption"}, filled(said.largest_at, {
           quantity: tell.quantity(name), size: numbers.error(value.largest[name].value, name),
           time: `${numbers.fixed(value.largest[name].time / 3600, 2)} h`,

@@ -4,13 +4,17 @@ const partTab = {
   name: "part", asked: true,
   build(host, {said, tell, numbers, words, ask}) {
     const [program, features] = ["program", "features"].map(name => {
+      const files = element("datalist", {id: `studio-${name}-files`});
       const input = element("input", {type: "text", spellcheck: false, autocomplete: "off"});
-      return {input, label: element("label", {}, said[name], " ", input)};
+      input.setAttribute("list", files.id);
+      return {input, files, label: element("label", {}, said[name], " ", input, files)};
     });
+    const beside = element("p", {className: "caption"});
+    const offer = ({files}, names) => files.replaceChildren(...names.map(value => element("option", {value})));
     const form = element("form", {className: "asked"}, program.label, features.label,
       element("button", {type: "submit"}, said.evaluate));
     const body = element("div");
-    host.append(element("p", {className: "caption"}, said.part_caption), form, body);
+    host.append(element("p", {className: "caption"}, said.part_caption), form, beside, body);
     const options = () => Object.fromEntries([["program", program], ["features", features]].map(
       ([name, {input}]) => [name, input.value.trim()]).filter(([, value]) => value));
     form.addEventListener("submit", event => {
@@ -26,6 +30,10 @@ const partTab = {
     return {
       options, body,
       show(value) {
+        offer(program, value.programs);
+        offer(features, value.features_files);
+        beside.textContent = value.programs.length
+          ? filled(said.programs_there, {names: value.programs.join(", ")}) : said.no_programs;
         if (!value.rows) { body.replaceChildren(); return; }
         const states = value.rows.length ? value.rows[0].states.map(({state}) => said.states[state] || state) : [];
         const heads = [said.feature, said.characteristic, [said.limits, "number"],

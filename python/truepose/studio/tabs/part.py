@@ -7,6 +7,7 @@ be far larger than a message.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from truepose.errors import Problem, RequestError
@@ -19,18 +20,24 @@ from truepose.workpiece.read import read_part
 NAME = "part"
 FOLLOWS = frozenset({EDITS, CONDITION})
 
+PROGRAMS, FEATURES = (".ngc", ".nc", ".gcode", ".gco", ".g", ".tap", ".cnc"), (".toml",)
+"""How names of such files end; any other name can be typed."""
+
+MOST_FILES = 100
+"""Of a kind that are listed."""
+
 MOST_CHARACTERISTICS = 100
 """Quantities of features that are told, in the order of the part."""
 
 
 def give(question: Question) -> Iterator[Value]:
-    """Every toleranced quantity against its limits; empty where no program is named.
+    """Every toleranced quantity against its limits; which files there are where none is named.
 
     Raises `RequestError` (file-missing) and as `truepose.part`.
     """
     program, features = (_name(question, key) for key in ("program", "features"))
     if program is None:
-        yield {}
+        yield _beside(question.folder)
         return
     path = to_read(question.folder, program)
     asked = read_part(
@@ -40,11 +47,22 @@ def give(question: Question) -> Iterator[Value]:
     evaluation = evaluate_part(question.machine, asked, condition, progress=question.progress)
     rows = _rows(evaluation)
     yield {
+        **_beside(question.folder),
         "points": evaluation.walked.points,
         "samples": evaluation.samples,
         "rows": rows[:MOST_CHARACTERISTICS],
         "left_out": max(0, len(rows) - MOST_CHARACTERISTICS),
     }
+
+
+def _beside(folder: Path) -> dict[str, list[str]]:
+    """Names of files that may be programs, or have features, in their order."""
+    names = sorted(place.name for place in folder.iterdir() if place.is_file())
+    by_ending = {
+        key: [name for name in names if name.lower().endswith(endings)]
+        for key, endings in (("programs", PROGRAMS), ("features_files", FEATURES))
+    }
+    return {key: found[:MOST_FILES] for key, found in by_ending.items()}
 
 
 def _name(question: Question, key: str) -> str | None:

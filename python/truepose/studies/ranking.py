@@ -39,10 +39,10 @@ def ranked(dataset: xr.Dataset) -> Indices:
 def causes(dataset: xr.Dataset) -> list[WhyNotOk]:
     """Each cause of variants that are not ok, the most frequent first."""
     status, codes = dataset["status"].values, dataset["code"].values
-    found: dict[tuple[str, str], list[int]] = {}
+    groups: dict[tuple[str, str], list[int]] = {}
     for number in np.flatnonzero((status == INFEASIBLE) | (status == FAILED)).tolist():
-        found.setdefault((str(status[number]), str(codes[number])), []).append(number)
-    rows = sorted(found.items(), key=lambda cause: -len(cause[1]))
+        groups.setdefault((str(status[number]), str(codes[number])), []).append(number)
+    rows = sorted(groups.items(), key=lambda cause: -len(cause[1]))
     reasons = dataset["reason"].values
     return [WhyNotOk(word, len(of), of[0], str(reasons[of[0]])) for (word, _), of in rows]
 

@@ -62,7 +62,7 @@ def _beside(folder: Path) -> dict[str, list[str]]:
         key: [name for name in names if name.lower().endswith(endings)]
         for key, endings in (("programs", PROGRAMS), ("features_files", FEATURES))
     }
-    return {key: found[:MOST_FILES] for key, found in by_ending.items()}
+    return {key: names[:MOST_FILES] for key, names in by_ending.items()}
 
 
 def _name(question: Question, key: str) -> str | None:

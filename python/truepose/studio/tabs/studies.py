@@ -46,9 +46,9 @@ def give(question: Question) -> Iterator[Value]:
 
     Raises `RequestError` (bad-argument, extra-missing, file-missing) and as `StudyStore`.
     """
-    found = sorted(_studies(question.folder))
-    told: dict[str, Any] = {"stores": found[:MOST_STORES], "stores_left_out": 0}
-    told["stores_left_out"] = len(found) - len(told["stores"])
+    stores = sorted(_studies(question.folder))
+    left_out = max(0, len(stores) - MOST_STORES)
+    told: dict[str, Any] = {"stores": stores[:MOST_STORES], "stores_left_out": left_out}
     name = question.options.get("store")
     if name is None:
         yield told

@@ -28,5 +28,6 @@ BENCHMARKS = (
     Benchmark("part"),
     Benchmark("calibration"),
     Benchmark("live_page", cores=2),
+    Benchmark("studio", cores=2),
     Benchmark("scaling", cores=2),
 )

@@ -2,12 +2,15 @@
 
 function canvasOf(canvas) {
   const context = canvas.getContext("2d");
-  let styles = getComputedStyle(document.documentElement);
+  let styles = getComputedStyle(document.documentElement), size = null;
+  // Who asks for its size has the whole page laid out: that is done where it has changed alone.
+  new ResizeObserver(() => { size = null; }).observe(canvas);
 
   // Cleared, and its width and height in CSS pixels.
   function begin() {
     const ratio = Math.min(3, devicePixelRatio || 1);
-    const width = canvas.clientWidth, height = canvas.clientHeight;
+    size ??= {width: canvas.clientWidth, height: canvas.clientHeight};
+    const {width, height} = size;
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
     context.setTransform(ratio, 0, 0, ratio, 0, 0);

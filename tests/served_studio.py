@@ -7,13 +7,14 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from urllib.parse import quote
 
 from websockets.sync.client import ClientConnection, connect
@@ -22,6 +23,13 @@ from truepose.studio.messages import MOST_SENT, SENT
 
 LIMIT = 120.0
 """s; what does not answer until then never will."""
+
+
+def free_port() -> int:
+    """A port that no process has now."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
 
 
 @dataclass
@@ -76,15 +84,15 @@ class ServedStudio:
     def window(self) -> Iterator[Window]:
         """A window, and all that it is told."""
         at = f"ws://{self.host}/socket?token={self.token}"
-        with connect(at, origin=f"http://{self.host}", open_timeout=LIMIT) as socket:  # type: ignore[arg-type]
-            yield Window(socket)
+        with connect(at, origin=f"http://{self.host}", open_timeout=LIMIT) as one:  # type: ignore[arg-type]
+            yield Window(one)
 
     def end(self, number: int = signal.SIGINT) -> tuple[int, str]:
         """End it by a signal; its exit code, and what it said on stderr."""
         if self.process.poll() is None:
             self.process.send_signal(number)
         _, err = self.process.communicate(timeout=LIMIT)
-        return self.process.returncode, self.said + err
+        return self.process.returncode, self.said + (err or "")
 
 
 @dataclass
@@ -117,19 +125,29 @@ class Window:
                 return message
 
 
-def started(file: Path, state: Path, *options: str) -> ServedStudio:
-    """Start a studio of a machine file, whose state is kept in a folder of its own."""
+def started(
+    file: Path,
+    state: Path,
+    *options: str,
+    stderr: int | IO[str] = subprocess.PIPE,
+    more: Mapping[str, str] | None = None,
+) -> ServedStudio:
+    """Start a studio of a machine file, whose state is kept in a folder of its own.
+
+    `stderr`: where what it says goes; `more`: of its environment.
+    """
     environment = os.environ | {
         "XDG_STATE_HOME": str(state),
         "TRUEPOSE_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
+        **(more or {}),
     }
     process = subprocess.Popen(
         [sys.executable, "-m", "truepose", "studio", file.name, "--no-open", *options],
         cwd=file.parent,
         env=environment,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=stderr,
         text=True,
     )
     assert process.stdout is not None

@@ -19,10 +19,11 @@ from websockets.sync.client import connect
 
 import truepose as tp
 from command_line import PLANAR, call
-from served_studio import LIMIT, ServedStudio, Window, started, studio_of
+from served_studio import LIMIT, ServedStudio, Window, free_port, started, studio_of
 from truepose.cli import run
 from truepose.language import speaking
 from truepose.reporting.live import part
+from truepose.studio.server import LOOK_EVERY
 from truepose.studio.shared_state import EVERY, LARGEST_FILE
 from truepose.verdict.answer import BEFORE
 
@@ -36,12 +37,6 @@ def folder_of(at: Path) -> Path:
     (folder / "m.toml").write_bytes(PLANAR.read_bytes())
     (at / "secret.toml").write_text("nobody's business")
     return folder
-
-
-def free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
 
 
 @pytest.fixture(scope="module")
@@ -389,6 +384,41 @@ def test_a_file_that_changes_under_it(own: ServedStudio, tmp_path: Path) -> None
         assert verdict[0]["asked"] == pytest.approx(0.9e-3)
         file.unlink()
         assert window.until("changed")["hash"] is None
+
+
+def test_a_file_that_looks_as_before_when_another_was_read(
+    own: ServedStudio, tmp_path: Path
+) -> None:
+    """It was read again as somebody had changed it, who took that back before it was looked at."""
+    file = tmp_path / "machines" / "m.toml"
+    first, looks = file.read_bytes(), file.stat()
+    other = first.replace(b'target = "0.5 mm"', b'target = "0.9 mm"')
+    assert other != first
+
+    def write(content: bytes) -> None:
+        """With the same size, place and time, as what is looked at first."""
+        with file.open("r+b") as opened:
+            opened.write(content)
+        os.utime(file, ns=(looks.st_atime_ns, looks.st_mtime_ns))
+
+    with own.window() as window:
+        number = window.until("state")["number"]
+        time.sleep(2.0 * LOOK_EVERY)
+        for _ in range(5):  # by chance it is looked at in between
+            write(other)
+            window.say(type="reload")
+            number = window.until("state", number=number + 1)["number"]
+            write(first)
+            time.sleep(3.0 * LOOK_EVERY)
+            window.say(type="difference")
+            window.told.clear()
+            window.until("difference")
+            if any(told["type"] == "changed" for told in window.told):
+                break
+            window.say(type="reload")
+            number = window.until("state", number=number + 1)["number"]
+        else:
+            pytest.fail("not told that the file is another one than was read")
 
 
 def test_a_report_that_is_being_made_holds_nobody_up(tmp_path: Path) -> None:

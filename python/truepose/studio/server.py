@@ -311,13 +311,14 @@ class Studio:
 
     async def _watch(self) -> None:
         """See the machine file change on the disk."""
-        path, seen = self.session.file.path, ""
+        path, seen, read = self.session.file.path, "", None
         while True:
             await asyncio.sleep(LOOK_EVERY)
-            looks = await asyncio.to_thread(_looks, path)
-            if looks == seen:
+            looks, file = await asyncio.to_thread(_looks, path), self.session.file
+            # One that was read again meanwhile is not known to have changed, however it looks.
+            if looks == seen and file is read:
                 continue
-            seen = looks
+            seen, read = looks, file
             digest = await asyncio.to_thread(_digest, path)
             async with self._lock:
                 await self._told(self.session.file_is(digest))

@@ -87,6 +87,14 @@ test-python: package tools ## run the package's tests, of each sweep a member or
 test-python-all: package tools ## run all of the package's tests, and write what they found for the site
 	$(PYTEST) --results=build/test-results.json
 
+# Needs chromium. How long, and by which numbers drawn at random: make soak MINUTES=10 SEED=2.
+MINUTES := 60
+SEED := 1
+
+.PHONY: soak
+soak: package tools ## let the studio and its page work at random for an hour, and look at their memory
+	PYTHONPATH=tests:. $(BIN)/python -m studio_soak --minutes $(MINUTES) --seed $(SEED)
+
 .PHONY: klipper
 klipper: $(KLIPPER) ## fetch and build Klipper's kinematics, with which tests compare, into build/klipper
 

@@ -8,14 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from browser import opened_browser
 from command_line import MACHINES
 from served_studio import studio_of
 from studio_visit import PATIENCE, Visit, opened
-from system_package import missing
-from truepose.reporting.live import part
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "how_to" / "studio.md"
@@ -42,14 +37,6 @@ def rows(text: str) -> list[dict[str, str]]:
     """What is typed in an example, and what the page then says."""
     matches = map(ROW.match, text.splitlines())
     return [match.groupdict() for match in matches if match is not None]
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
-        yield context
 
 
 @contextmanager

@@ -10,11 +10,9 @@ from typing import Any
 import pytest
 
 import truepose as tp
-from browser import Heard, opened_browser
+from browser import Heard
 from command_line import MACHINES, PLANAR
 from served_studio import ServedStudio, studio_of
-from system_package import missing
-from truepose.reporting.live import part
 from truepose.studio.page import studio_page
 
 PATIENCE = 60_000
@@ -38,14 +36,6 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedStudio]:
     (folder / "m.toml").write_bytes(PLANAR.read_bytes())
     with studio_of(folder / "m.toml", folder / "state") as one:
         yield one
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
-        yield context
 
 
 @pytest.fixture

@@ -13,11 +13,9 @@ from typing import Any
 import pytest
 
 import truepose as tp
-from browser import opened_browser
 from command_line import MACHINES, PLANAR
 from served_studio import ServedStudio, started, studio_of
-from studio_visit import NUMBER, PATIENCE, Visit, opened, visited
-from system_package import missing
+from studio_visit import NUMBER, PATIENCE, Visit, opened
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import MachineFileError
 from truepose.reporting.live import part
@@ -27,25 +25,11 @@ EXPANSION = "strut.1.expansion"
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
-        yield context
-
-
-@pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ServedStudio, Path]]:
     folder = tmp_path_factory.mktemp("used")
     (folder / "m.toml").write_bytes(PLANAR.read_bytes())
     with studio_of(folder / "m.toml", folder / "state") as one:
         yield one, folder
-
-
-@pytest.fixture
-def visit(browser: Any, served: tuple[ServedStudio, Path]) -> Iterator[Visit]:
-    with visited(browser, *served) as visit:
-        yield visit
 
 
 def test_a_value_changes_pixels_and_text_and_back_changes_neither(visit: Visit) -> None:

@@ -10,12 +10,9 @@ import numpy as np
 import pytest
 
 import truepose as tp
-from browser import opened_browser
 from command_line import PLANAR
 from served_studio import ServedStudio, studio_of
 from studio_visit import PATIENCE, Visit, visited
-from system_package import missing
-from truepose.reporting.live import part
 
 PROGRAM = """G21 G90 G94 F900
 G0 X300 Y200
@@ -23,14 +20,6 @@ G0 X300 Y200
 G1 X340 Y210
 (end)
 """
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
-        yield context
 
 
 @pytest.fixture(scope="module")
@@ -44,12 +33,6 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ServedStu
     (folder / "front.ngc").write_text(PROGRAM)
     with studio_of(folder / "m.toml", folder / "state") as one:
         yield one, folder
-
-
-@pytest.fixture
-def visit(browser: Any, served: tuple[ServedStudio, Path]) -> Iterator[Visit]:
-    with visited(browser, *served) as visit:
-        yield visit
 
 
 def panel(visit: Visit, name: str) -> Any:

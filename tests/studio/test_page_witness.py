@@ -4,29 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import truepose as tp
-from browser import opened_browser
 from command_line import MACHINES
 from served_studio import ServedStudio, studio_of
-from studio_visit import PATIENCE, PIXELS, Visit, visited
-from system_package import missing
-from truepose.reporting.live import part
+from studio_visit import PATIENCE, PIXELS, Visit
 from truepose.verdict.answer import AFTER, BEFORE, Answer
 
 MACHINE = MACHINES / "hexapod.toml"
 STATES = {"before": BEFORE, "after": AFTER}
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
-        yield context
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +23,6 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ServedStu
     (folder / "m.toml").write_bytes(MACHINE.read_bytes())
     with studio_of(folder / "m.toml", folder / "state") as one:
         yield one, folder
-
-
-@pytest.fixture
-def visit(browser: Any, served: tuple[ServedStudio, Path]) -> Iterator[Visit]:
-    with visited(browser, *served) as visit:
-        yield visit
 
 
 def answered(*settings: str) -> dict[str, Answer]:

@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 import random
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import truepose as tp
-from browser import Heard, opened_browser
+from browser import Heard
 from command_line import MACHINES
 from served_studio import Window, free_port, studio_of
 from sweeps import thinned
-from system_package import missing
-from truepose.reporting.live import part
 
 PATIENCE = 120_000
 CLOSE = 1e-12
@@ -39,14 +37,6 @@ QUICK = """() => Object.fromEntries([...document.querySelectorAll("#live [data-o
 POSE = (
     """() => Number(document.querySelector('#live [data-of="pose.x"] input[type=number]').value)"""
 )
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
-        yield context
 
 
 def random_edits(window: Window, chance: random.Random) -> None:

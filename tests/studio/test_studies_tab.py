@@ -11,13 +11,10 @@ import numpy as np
 import pytest
 
 import truepose as tp
-from browser import opened_browser
 from command_line import PLANAR
 from served_studio import ServedStudio, studio_of
-from studio_visit import PATIENCE, Visit, visited
-from system_package import missing
+from studio_visit import PATIENCE, Visit
 from truepose.errors import RequestError
-from truepose.reporting.live import part
 from truepose.studio.answers import Question
 from truepose.studio.messages import fits
 from truepose.studio.tabs import TABS
@@ -121,23 +118,9 @@ def test_what_is_no_study_is_told(folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
-        yield context
-
-
-@pytest.fixture(scope="module")
 def served(folder: Path) -> Iterator[tuple[ServedStudio, Path]]:
     with studio_of(folder / "m.toml", folder.parent / "state") as one:
         yield one, folder
-
-
-@pytest.fixture
-def visit(browser: Any, served: tuple[ServedStudio, Path]) -> Iterator[Visit]:
-    with visited(browser, *served) as visit:
-        yield visit
 
 
 def test_a_variant_that_is_set_has_its_numbers(visit: Visit, folder: Path) -> None:

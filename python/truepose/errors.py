@@ -102,6 +102,10 @@ CATALOGUE: dict[str, str] = {
     "correlation-not-semidefinite": "correlations that cannot all hold at once",
     "no-expansion": "a temperature is given for a part that gives no expansion",
     "tolerance-reversed": "a tolerance whose upper limit is below its lower one",
+    # costs, from which a design is chosen
+    "cost-matches-nothing": "a cost of a parameter or a part that the machine does not have",
+    "cost-twice": "two costs of one tolerance, or of one key of a part",
+    "cost-falls": "a cost that falls as the tolerance gets tighter",
     # the workspace
     "grid-count": "a grid count that is not a whole number of one or more",
     "grid-ends": "a grid count of one with two different ends",

@@ -42,6 +42,8 @@ class Document:
     """Keys of rows that `[each.*]` gave, and where: `("strut", 0, "material")`."""
     several: tuple[str, ...] = SEVERAL
     """The tables of which a file of this kind may have several."""
+    text: str = ""
+    """What was read, before settings."""
 
     def line(self, key: Key) -> int | None:
         """Line of `key`, or of the nearest table round it; None for what a setting wrote."""
@@ -175,7 +177,7 @@ def document_of(
     except TomlError as error:
         raise MachineFileError(_not_toml(error, file, text, kind)) from None
     file_hash = hashlib.sha256(content).hexdigest()
-    return Document(file, Path(path).name, file_hash, data, lines_of(text))
+    return Document(file, Path(path).name, file_hash, data, lines_of(text), text=text)
 
 
 def _not_toml(error: TomlError, file: str, text: str, kind: FileKind) -> Problem:

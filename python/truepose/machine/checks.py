@@ -15,6 +15,7 @@ from truepose.files.document import ARRAY_TABLES, Document, Key, named_rows
 from truepose.files.units import shown_value
 from truepose.files.wording import counted, did_you_mean, one_of
 from truepose.machine.build_workspace import too_large
+from truepose.machine.cases import CASE, CONDITION
 from truepose.machine.condition import DEFAULT_PART
 from truepose.machine.elements import drive_kinds, guide_kinds
 from truepose.machine.parts import BODIES, carriage_part, is_body, is_limb, limb_part
@@ -405,10 +406,17 @@ def _pose_rows(document: Document, validated: Validated) -> Iterator[Problem]:
                 )
 
 
+def _conditions(validated: Validated) -> Iterator[tuple[str, ConditionTable]]:
+    """`[condition]` and every case, each with its path in the file."""
+    every = {CONDITION: validated}
+    every |= {f"{CASE}.{name}": of_case for name, of_case in validated.cases.items()}
+    for path, one in every.items():
+        table = one.table(ConditionTable)
+        if table is not None:
+            yield path, table
+
+
 def _parts_with_temperatures(document: Document, validated: Validated) -> Iterator[Problem]:
-    condition = validated.table(ConditionTable)
-    if condition is None:
-        return
     rows = [
         f"{table}.{name}"
         for table in ("drive", "strut")
@@ -421,31 +429,36 @@ def _parts_with_temperatures(document: Document, validated: Validated) -> Iterat
     ]
     limbs = [limb_part(name) for _, name in named_rows(document.data, "limb")]
     growing = [*rows, *limbs, *(body for body in BODIES if body != "tool")]
-    for key, given, known in (
-        ("temperature", condition.temperature, [DEFAULT_PART, *rows, *BODIES]),
-        ("gradient", condition.gradient, growing),
-    ):
-        for part in given or ():
-            if part not in known:
-                yield document.problem(
-                    Fault(
-                        "unknown-part",
-                        f'there is no part "{part}"'
-                        if part not in BODIES
-                        else f"a {key} along the {part} is not known",
-                        found=shown_value(part),
-                        expected=one_of(known),
-                        hint=did_you_mean(part, known),
-                    ),
-                    document.key(f"condition.{key}.{part}"),
-                )
+    for path, condition in _conditions(validated):
+        for key, given, known in (
+            ("temperature", condition.temperature, [DEFAULT_PART, *rows, *BODIES]),
+            ("gradient", condition.gradient, growing),
+        ):
+            for part in given or ():
+                if part not in known:
+                    yield document.problem(
+                        Fault(
+                            "unknown-part",
+                            f'there is no part "{part}"'
+                            if part not in BODIES
+                            else f"a {key} along the {part} is not known",
+                            found=shown_value(part),
+                            expected=one_of(known),
+                            hint=did_you_mean(part, known),
+                        ),
+                        document.key(f"{path}.{key}.{part}"),
+                    )
 
 
 def _gradients(document: Document, validated: Validated) -> Iterator[Problem]:
     """Along a strut or a drive there is one gradient; a body has three."""
-    condition = validated.table(ConditionTable)
-    for part in (condition.gradient or ()) if condition is not None else ():
-        key = document.key(f"condition.gradient.{part}")
+    gradients = [
+        (path, part)
+        for path, condition in _conditions(validated)
+        for part in condition.gradient or ()
+    ]
+    for path, part in gradients:
+        key = document.key(f"{path}.gradient.{part}")
         value = document.value(key)
         across = is_body(part) or is_limb(part)
         if isinstance(value, list) != across:

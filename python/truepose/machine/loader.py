@@ -14,7 +14,15 @@ from truepose.files.data_file import DataFiles
 from truepose.files.document import Document, document_of, read
 from truepose.files.settings import apply, require_settings
 from truepose.files.units import shown_value
-from truepose.machine import build_kernel, build_parts, build_workspace, checks, validation
+from truepose.machine import (
+    build_costs,
+    build_kernel,
+    build_parts,
+    build_workspace,
+    checks,
+    validation,
+)
+from truepose.machine.cases import share_condition
 from truepose.machine.condition import Condition
 from truepose.machine.families.expansion import TABLE as FAMILY
 from truepose.machine.families.expansion import expand
@@ -75,6 +83,7 @@ def _loaded(
     expansion = expand(document, settings, owned)
     share_each(document, settings, owned.free_tables)
     apply(document, settings, owned.free_tables)
+    share_condition(document)
     _require_schema(document)
     validated, problems = validation.validate(document, owned)
     if validated.family is None and FAMILY in document.data:
@@ -130,12 +139,12 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     data_files = DataFiles(document)
     drives = build_parts.drives(validated)
     struts = build_parts.struts(validated)
-    condition = _condition(
-        validated,
-        data_files,
-        drives,
-        struts,
-        dict.fromkeys(s.tables["condition"] for s in registry if "condition" in s.tables),
+    of_sources = tuple(
+        dict.fromkeys(s.tables["condition"] for s in registry if "condition" in s.tables)
+    )
+    condition, *of_cases = (
+        _condition(one, data_files, drives, struts, of_sources)
+        for one in (validated, *validated.cases.values())
     )
     workspace, home = build_workspace.workspace(document, validated, data_files, problems)
     _raise([*problems, *data_files.problems])
@@ -160,6 +169,18 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         family=family,
     )
     built = [source.build(parts) for source in registry]
+    priced = build_costs.costs(
+        document,
+        validated,
+        kernel,
+        family,
+        [
+            *(row.part for rows in (drives, struts, guides, limbs) for row in rows),
+            *BODIES,
+        ],
+        data_files,
+        parts.problems,
+    )
     _raise([*parts.problems, *data_files.problems])
     sources: tuple[ErrorSource, ...] = tuple(source for source in built if source is not None)
     accuracy = validated.table(AccuracyTable)
@@ -192,6 +213,8 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         controller_holds=None if controller is None else controller.holds,
         family=family,
         path=os.path.abspath(document.file),  # noqa: PTH100  links stay
+        cases=dict(zip(validated.cases, of_cases, strict=True)),
+        costs=priced,
     )
 
 

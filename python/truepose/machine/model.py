@@ -28,6 +28,7 @@ from truepose.machine.compliances import (
     known,
 )
 from truepose.machine.condition import DEFAULT_PART, Condition
+from truepose.machine.costs import Costs
 from truepose.machine.equality import equal
 from truepose.machine.families.parameters import FamilyParameters
 from truepose.machine.limbs import Limb
@@ -49,7 +50,7 @@ _HANDED_THROUGH = (
     "forces",
 )
 
-_MAPPINGS = ("settings", "file_units", "data_files", "replaced")
+_MAPPINGS = ("settings", "file_units", "data_files", "replaced", "cases")
 
 _NOT_HELD = "the struts do not hold the platform"
 _HELD = "guides and what has no stiffness are rigid: the stiffness is infinite, not the compliance"
@@ -120,6 +121,12 @@ class Machine(Represented):
 
     path: str = ""
     """Where the file was read, from the root of the file system; it says nothing of the machine."""
+
+    cases: Mapping[str, Condition] = field(default_factory=dict)
+    """Further conditions that the file names: `[case.NAME]`."""
+
+    costs: Costs | None = None
+    """What may be chosen, and what it costs: the file's `[cost]`."""
 
     forward: OfJoints = field(init=False, repr=False)
     inverse: OfPoses = field(init=False, repr=False)

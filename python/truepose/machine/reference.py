@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.document import ARRAY_TABLES, SEVERAL
 from truepose.files.tolerance_standards import STANDARDS, designations_of
+from truepose.machine.cases import CASE, CONDITION
 from truepose.machine.elements import FamilyKind, kinds_of
 from truepose.machine.materials import MATERIALS
 from truepose.machine.shared_keys import EACH
@@ -46,6 +47,12 @@ def json_schema(registry: Sequence[SourceType]) -> Json:
         "description": _EACH_DOC,
         "properties": {table: _shared_schema(table, by_table[table]) for table in ARRAY_TABLES},
         "additionalProperties": False,
+    }
+    of_condition = _merged(by_table[CONDITION])
+    properties[CASE] = {
+        "type": "object",
+        "description": _CASE_DOC,
+        "additionalProperties": of_condition,
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -167,7 +174,7 @@ def page(registry: Sequence[SourceType]) -> str:
     parts = [_INTRODUCTION]
     for table, models in by_table.items():
         parts.append(_section(table, models, registry, reader))
-    parts += [_each(), _materials(), _classes()]
+    parts += [_cases(), _each(), _materials(), _classes()]
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -314,6 +321,10 @@ def _each() -> str:
     return f"## {tables}\n\n{_EACH_DOC}\n"
 
 
+def _cases() -> str:
+    return f"## `[{CASE}.NAME]`\n\n{_CASE_DOC}\n"
+
+
 def _materials() -> str:
     lines = [
         "## Materials",
@@ -354,6 +365,13 @@ def _classes() -> str:
 _EACH_DOC = """\
 Keys that every row of an array table has unless it writes its own; a row that writes one keeps all
 of its own value, tables within it included. Rows have a `name` each."""
+
+_CASE_DOC = """\
+A further condition, with the keys of `[condition]`. A key that it does not write is that of
+`[condition]`, as a whole; a case that writes a force, as `force`, `cutting` or `kienzle`, takes
+none of these, and one that writes `temperature` takes no `temperature_log`. A design holds
+in `[condition]` and in every case; commands ask `[condition]`, and Python has the cases in
+`machine.cases`."""
 
 _INTRODUCTION = """\
 # The machine file

@@ -13,7 +13,7 @@ from truepose.files.document import SEVERAL, Document, Key
 from truepose.files.file_table import FileTable
 from truepose.files.units import FileUnit, UnitSystem, shown_value, type_phrase
 from truepose.files.wording import did_you_mean, nearest, one_of
-from truepose.machine import shared_keys
+from truepose.machine import cases, shared_keys
 from truepose.machine.elements import DriveKind, ElementKind, kinds_of
 from truepose.machine.families import MachineFamily
 from truepose.machine.tables import REQUIRED, Owners, takes_every_key
@@ -46,6 +46,8 @@ class Validated:
     """Per row of a table whose rows have a kind: the model of that."""
     misspelt: set[Key] = field(default_factory=set)
     """Keys that an unknown key was most likely meant to be: they are not missing as well."""
+    cases: dict[str, Validated] = field(default_factory=dict)
+    """Per case, by name: the models of a condition."""
 
     def table(self, model: type[Model]) -> Model | None:
         """The one instance of `model`, or None."""
@@ -68,7 +70,7 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
     for table in REQUIRED:
         if table not in data:
             problems.append(_missing_table(document, table))
-    known = {"schema", shared_keys.EACH, *owners.by_table}
+    known = {"schema", shared_keys.EACH, cases.CASE, *owners.by_table}
     problems += shared_keys.problems(document)
     problems += [unknown_key(document, (key,), known) for key in data if key not in known]
     units = read_units(document, problems)
@@ -79,6 +81,12 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
                 _array(document, table, models, validated, problems)
             else:
                 _single(document, table, models, validated, problems)
+    of_condition = owners.by_table[cases.CONDITION]
+    for name, case in cases.tables(document, problems).items():
+        of_case = validated.cases[name] = Validated(units)
+        filled, faults = share_out(document, (cases.CASE, name), of_condition, case, validated)
+        problems += faults
+        of_case.tables |= {model: one for model, one in filled.items() if one is not None}
     return validated, one_per_unit(problems)
 
 

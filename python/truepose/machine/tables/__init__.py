@@ -17,6 +17,7 @@ from truepose.machine.tables.body import FrameTable, PlatformTable, ToolTable
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.controller import ControllerTable
+from truepose.machine.tables.cost import CostTable
 from truepose.machine.tables.drive import DriveTable
 from truepose.machine.tables.family import FamilyTable
 from truepose.machine.tables.guide import GuideTable
@@ -77,6 +78,7 @@ def owners(added: Iterable[Mapping[str, type[BaseModel]]]) -> Owners:
         "accuracy": [AccuracyTable],
         "controller": [ControllerTable],
         "calibration": [CalibrationTable],
+        "cost": [CostTable],
     }
     for tables in added:
         for table, model in tables.items():

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from truepose.compensation.compensate import compensate
     from truepose.controllers import export, import_machine
     from truepose.controllers.gcode import correct_program
+    from truepose.design.allocate import allocate
     from truepose.error_budget.evaluate import budget
     from truepose.error_budget.over_time import over_time
     from truepose.error_budget.strain import strain
@@ -54,6 +55,7 @@ _WHERE = {
     "Input": "truepose.uncertainty_analysis.functions.inputs",
     "Machine": "truepose.machine",
     "accuracy": "truepose.verdict.accuracy",
+    "allocate": "truepose.design.allocate",
     "bounds": "truepose.uncertainty_analysis.bounds",
     "budget": "truepose.error_budget.evaluate",
     "calibrate": "truepose.calibration.calibrate",
@@ -95,6 +97,7 @@ __all__ = [
     "Machine",
     "__version__",
     "accuracy",
+    "allocate",
     "bounds",
     "budget",
     "calibrate",

@@ -106,6 +106,10 @@ CATALOGUE: dict[str, str] = {
     "cost-matches-nothing": "a cost of a parameter or a part that the machine does not have",
     "cost-twice": "two costs of one tolerance, or of one key of a part",
     "cost-falls": "a cost that falls as the tolerance gets tighter",
+    "no-cost": "a design is wanted of a file that does not say what may be chosen",
+    "option-not-set": "an option of a choice that the file cannot set",
+    "bad-allocation": "an allocation that cannot be made as it is asked",
+    "target-out-of-reach": "a target that no choice keeps, with everything at its finest",
     # the workspace
     "grid-count": "a grid count that is not a whole number of one or more",
     "grid-ends": "a grid count of one with two different ends",

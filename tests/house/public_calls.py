@@ -56,6 +56,18 @@ def accuracy() -> None:
     assert {answer.state for answer in tp.accuracy(small(), POSE)}
 
 
+@use("allocate")
+def allocate() -> None:
+    cost = 'bands = ["20 um", "50 um"]\nat = "20 um"\ncost = 4'
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "machine.toml"
+        text = (MACHINES / "planar_two_slider.toml").read_text(encoding="utf-8")
+        path.write_text(f'{text}\n[[cost.tolerance]]\nof = "strut.*.length"\n{cost}\n')
+        found = tp.allocate(tp.load(path))
+        assert found.cost == 3.2
+        assert '"50 um"' in found.text()
+
+
 @use("tightening")
 def tightening() -> None:
     advised = tp.tightening(small())

@@ -155,8 +155,10 @@ def functions() -> Iterator[str]:
         calibration.save(
             calibrated, original=EXAMPLES / "data" / "delta_printer.toml", date="2026-01-31"
         )
+        costs = tp.load(EXAMPLES / "data" / "hexapod_costs.toml")
         results = {
             "load": planar,
+            "allocate": tp.allocate(costs),
             "load().condition": warming.condition,
             "Input": tp.Input.normal(1.0, 0.1),
             "accuracy": tp.accuracy(planar),
@@ -196,6 +198,7 @@ def functions() -> Iterator[str]:
     yield from dataset_names("bounds(region)", tp.bounds(planar, region=region, gap=0.3))
     yield from dataset_names("calibrate", calibration.dataset)
     yield from dataset_names("plan", results["plan"].dataset)
+    yield from dataset_names("allocate", results["allocate"].dataset)
     inputs = {"a": tp.Input.uniform(1.0, 2.0), "b": tp.Input.normal(1.0, 0.1)}
     yield from dataset_names("worst_case(function)", tp.worst_case(product, inputs=inputs))
     yield from dataset_names("uncertainty(function)", tp.uncertainty(product, inputs=inputs))

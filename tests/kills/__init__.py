@@ -57,6 +57,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         "-o", "out.json", "--machine-output", "calibrated.toml", "--date", "2026-01-01",
         "--report", "page.html", "--force",
     ),
+    "allocate": ("allocate", str(DATA / "hexapod_costs.toml"), "-o", "designed.toml"),
     "plan": (
         "plan", str(PLANAR), "--instrument", "position=10um", "--poses", "4", "-o", "out.json",
         "--program", "measure.ngc", "--template", "readings.csv",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import os
 import pathlib
+import tempfile
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -19,6 +20,7 @@ from hypothesis import strategies as st
 
 import truepose as tp
 from build_machine import MACHINES
+from designs import file_with
 from truepose.errors import PoseError, TrueposeError
 
 EXAMPLES = int(os.environ.get("TRUEPOSE_EXAMPLES", "60"))
@@ -26,6 +28,15 @@ EXAMPLES = int(os.environ.get("TRUEPOSE_EXAMPLES", "60"))
 
 MACHINE = tp.load(MACHINES / "planar_two_slider.toml")
 POSE = MACHINE.poses()[:1]
+
+
+def costed() -> tp.Machine:
+    """A machine whose file says what may be chosen."""
+    with tempfile.TemporaryDirectory() as folder:
+        return tp.load(file_with(pathlib.Path(folder), "planar_two_slider"))
+
+
+COSTED = costed()
 JOINTS = MACHINE.inverse(POSE)
 
 
@@ -89,6 +100,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     name: (getattr(tp, name), {"model": MACHINE, "poses": POSE, **FEW.get(name, {})})
     for name in ("monte_carlo", "shares", "uncertainty", "worst_case")
 } | {
+    "allocate": (tp.allocate, {"machine": COSTED}),
     "circular_test": (
         tp.circular_test,
         {

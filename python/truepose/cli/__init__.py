@@ -26,6 +26,7 @@ COMMANDS: dict[str, str] = {
     "check": "truepose.cli.check",
     "plan": "truepose.cli.plan",
     "calibrate": "truepose.cli.calibrate",
+    "allocate": "truepose.cli.allocate",
     "compare": "truepose.cli.compare",
     "budget": "truepose.cli.budget",
     "compensate": "truepose.cli.compensate",

@@ -28,6 +28,7 @@ COMPUTING: dict[str, tuple[str, ...]] = {
     "strain": ("strain", "over.toml"),
     "report": ("report", "m.toml", *QUICK),
     "live": ("live", "m.toml"),
+    "allocate": ("allocate", "costs.toml"),
     "plan": ("plan", "m.toml", "--instrument", "position=10um", "--poses", "2"),
     "calibrate": ("calibrate", "m.toml", "measured.csv"),
     "compare": ("compare", "m.toml", "m.toml"),
@@ -61,6 +62,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     log = text.replace("\ntemperature = 35", '\ntemperature_log = "log.csv"')
     Path("warm.toml").write_text(log)
     Path("log.csv").write_text("time (min), default (degC)\n0, 20\n20, 25\n")
+    cost = '[[cost.tolerance]]\nof = "strut.*.length"\nbands = ["50 um"]\nat = "50 um"\ncost = 4\n'
+    Path("costs.toml").write_text(f"{text}\n{cost}")
     Path("over.toml").write_text((PLANAR.parent / "overconstrained.toml").read_text())
     Path("measured.csv").write_text(readings("planar_two_slider"))
     Path("part.ngc").write_text(PROGRAM)

@@ -108,7 +108,7 @@ class ToleranceCostTable(FileTable):
                     "nothing says what these bands cost",
                     found=f"no {' and no '.join(lacking)}",
                     expected=f'at = "10 um" and cost = 4{", and scale" if exponential else ""}',
-                    hint="without costs of your own begin with docs/design.md",
+                    hint="without costs of your own begin with docs/allocation.md",
                 )
             )
         if self.scale is not None and not exponential:

@@ -1,0 +1,9 @@
+"""Design: which tolerances, materials and stiffnesses keep an accuracy at least cost.
+
+The unknowns are one grade a tie and one option a choice (`space`). Of a machine with its options
+set, the largest error to first order at a pose, in a condition, along a direction is linear in the
+half widths (`error_model`): a cut. An integer programme of cuts (`programme`) gives the cheapest
+design that they allow, a judge (`judge`) looks where that design errs most, by the exact machine,
+and adds cuts there, until there is nothing to add (`search`). What comes out is proven at the worst
+poses (`proof`) and written as a machine file (`design_file`).
+"""

@@ -1,0 +1,231 @@
+"""One combination of options: the machine that it makes, its cuts, its bound, its cheapest grades.
+
+A cut is what a witness says of the columns x: along its direction, at its pose, in its case
+
+    known + sum over ties of |slope half widths| <= limit - excess
+
+`excess`: by how much the exact error was beyond the linear one there, if it was. Without it the
+cuts are those of the linear model, of which alone a lower bound is claimed. Where the worst machine
+cannot be assembled, there is no such number: then the design, and all that are as coarse, are out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.design.judge import Effort, Findings, Judge, WorstPlace
+from truepose.design.programme import Programme, ProgrammeSolution
+from truepose.design.space import Combination, DesignSpace
+from truepose.machine import Machine
+
+FIRST_GAP = 0.05
+"""Of the integer programme until its designs are clean."""
+
+_MOST_ROUNDS = 400
+"""Rounds of cuts: far more than any design needed, which ended after some tens."""
+
+
+@dataclass(frozen=True, eq=False)
+class GradedDesign:
+    """One grade for every tie of a combination of options, and what it costs."""
+
+    combination: Combination
+    grades: tuple[int, ...]
+    cost: float
+    judgement: Findings
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A witness's row: `coefficients` (x,) and `known`, m or rad, and the `excess` there."""
+
+    witness: WorstPlace
+    coefficients: Floats
+    known: float
+    limit: float
+    excess: float
+
+
+class OptionCombination:
+    """A combination with its `machine`, judged by `judge`."""
+
+    def __init__(
+        self,
+        space: DesignSpace,
+        combination: Combination,
+        machine: Machine,
+        judge: Judge,
+        tick: Callable[[], None],
+    ) -> None:
+        self.space, self.combination, self.machine, self.judge = space, combination, machine, judge
+        self.option_cost = space.option_cost(combination)
+        self.cuts: dict[tuple[object, ...], Cut] = {}
+        self.bound = self.option_cost
+        self.duals: dict[tuple[object, ...], float] = {}
+        self._too_coarse: list[Floats] = []
+        self._programme = Programme(space.cost, space.tie_of)
+        self._tick = tick
+
+    def add_cuts(self, witnesses: Sequence[WorstPlace]) -> None:
+        """Cuts of witnesses, also of those that another combination had."""
+        new = [witness for witness in witnesses if witness.key not in self.cuts]
+        if not new:
+            return
+        known, signed, usable = self.judge.rows(new)
+        for number, witness in enumerate(new):
+            if not usable[number]:  # of another machine, which reaches farther
+                continue
+            limit = self.judge.limits[witness.quantity]
+            assert limit is not None
+            self.cuts[witness.key] = Cut(
+                witness,
+                self.rows(witness.case, signed[number]),
+                float(known[number]),
+                limit,
+                0.0,
+            )
+
+    def rows(self, case: int, signed: Floats) -> Floats:
+        """(x,) what every column adds along a direction, of what each feature does, signed (f,)."""
+        member = self.judge.models[case].bands.member
+        return np.asarray(np.abs((self.space.halves * signed) @ member).sum(axis=1))
+
+    def finest(self) -> GradedDesign:
+        """Everything at its finest, judged quickly."""
+        x = self.space.finest()
+        return self._design(x, self.judge.assess(self._halves(x), self.judge.effort.quick))
+
+    def relax(self) -> None:
+        """Raise the bound to that of the relaxation, cut until nothing exceeds to first order."""
+        for _ in range(_MOST_ROUNDS):
+            self._tick()
+            solution = self._programme.relaxed(*self._rows(exact=False))
+            if solution is None:
+                self.bound = math.inf
+                return
+            self._keep(solution)
+            judgement = self._judged(solution.x, self.judge.effort.quick)
+            limits = self.judge.limits
+            beyond = [
+                witness
+                for witness in judgement.exceeding
+                if witness.linear > (limits[witness.quantity] or math.inf)
+            ]
+            if not self._cut(beyond, exact=False):
+                return
+
+    def cheapest(self, gap: float, known: GradedDesign | None) -> GradedDesign | None:
+        """The design within `gap` of the cheapest, judged clean; None where cuts leave none.
+
+        Goes first to a wide gap, as the first designs only gather cuts.
+        """
+        best: GradedDesign | None = None
+        for wide in dict.fromkeys((max(FIRST_GAP, gap), gap)):
+            best = self._clean(wide, known) or best
+        return best
+
+    def _clean(self, gap: float, known: GradedDesign | None) -> GradedDesign | None:
+        start = None if known is None else self.space.chosen(known.grades)
+        for _ in range(_MOST_ROUNDS):
+            self._tick()
+            coefficients, most = self._rows(exact=True)
+            allowed = start is not None and bool((coefficients @ start <= most + 1e-9).all())
+            solution = self._programme.whole(coefficients, most, gap, start if allowed else None)
+            if solution is None:
+                return None
+            design = self._design(solution.x, self._judged(solution.x, self.judge.effort))
+            exceeding = design.judgement.exceeding
+            if not exceeding:
+                return design
+            self._cut(exceeding, exact=True)
+            if any(math.isinf(witness.exact) for witness in exceeding):
+                self._too_coarse.append(solution.x)
+        return None
+
+    def cut(self, witnesses: Sequence[WorstPlace]) -> None:
+        """Take what was found beyond its limit after the judge found nothing."""
+        self._cut(witnesses, exact=True)
+
+    def bound_of_linear_model(self, gap: float) -> float:
+        """The bound of whole grades under the cuts of the linear model alone."""
+        self._tick()
+        solution = self._programme.whole(*self._rows(exact=False), gap)
+        if solution is None:
+            return math.inf
+        self.bound = max(self.bound, self.option_cost + solution.bound)
+        return self.bound
+
+    def halves(self, grades: Sequence[int]) -> Floats:
+        """(f,) half widths of a grade for every tie, SI."""
+        return self._halves(self.space.chosen(grades))
+
+    # --- inside
+
+    def _halves(self, x: Floats) -> Floats:
+        return np.asarray(x @ self.space.halves)
+
+    def _judged(self, x: Floats, effort: Effort) -> Findings:
+        """Judged without a climb first, which is only for what is clean without."""
+        halves = self._halves(x)
+        judgement = self.judge.assess(halves, effort.still)
+        return judgement if judgement.exceeding else self.judge.assess(halves, effort)
+
+    def _design(self, x: Floats, judgement: Findings) -> GradedDesign:
+        cost = math.fsum([self.option_cost, *self.space.cost[x > 0.5].tolist()])
+        return GradedDesign(self.combination, self.space.grades(x), cost, judgement)
+
+    def _keep(self, solution: ProgrammeSolution) -> None:
+        self.bound = max(self.bound, self.option_cost + solution.bound)
+        self.duals = {
+            key: float(dual)
+            for (key, _), dual in zip(self.cuts.items(), solution.dual, strict=True)
+            if dual > 0.0
+        }
+
+    def _cut(self, witnesses: Sequence[WorstPlace], *, exact: bool) -> bool:
+        """Cuts of witnesses; whether there was one that was not there as it is."""
+        before = len(self.cuts)
+        self.add_cuts(witnesses)
+        changed = len(self.cuts) > before
+        if not exact:
+            return changed
+        for witness in witnesses:
+            cut = self.cuts[witness.key]
+            excess = max(witness.exact - witness.linear, cut.excess)
+            if math.isinf(excess) or excess == cut.excess == 0.0:
+                continue
+            if excess == cut.excess:  # by the solver's tolerance
+                excess += (witness.share - 1.0) * cut.limit
+            self.cuts[witness.key] = Cut(
+                cut.witness, cut.coefficients, cut.known, cut.limit, excess
+            )
+            changed = True
+        return changed
+
+    def _rows(self, *, exact: bool) -> tuple[Floats, Floats]:
+        """Coefficients (n, x) and right sides (n,) of the cuts, of their limits."""
+        cuts = list(self.cuts.values())
+        limits = np.array([cut.limit for cut in cuts])
+        rows = np.array([cut.coefficients for cut in cuts]).reshape(len(cuts), self.space.cost.size)
+        known = np.array([cut.known + (cut.excess if exact else 0.0) for cut in cuts])
+        coefficients = rows / limits[:, np.newaxis]
+        most = 1.0 - known / limits
+        if exact and self._too_coarse:
+            # At least one tie has to be finer than in a design that cannot be assembled.
+            finer = np.array([self._as_coarse(x) for x in self._too_coarse])
+            coefficients = np.concatenate([coefficients, finer])
+            most = np.concatenate([most, np.full(len(finer), len(self.space.ties) - 1.0)])
+        return coefficients, most
+
+    def _as_coarse(self, x: Floats) -> Floats:
+        """(x,) 1 for the columns that are as coarse as the design's, or coarser."""
+        grades = np.array(self.space.grades(x))
+        return np.asarray(self.space.grade_of >= grades[self.space.tie_of], np.float64)
+
+
+__all__ = ["Cut", "GradedDesign", "OptionCombination"]

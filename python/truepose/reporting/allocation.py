@@ -1,0 +1,169 @@
+"""Tables of an allocation: what was chosen, what the error is made of, where it binds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from truepose.design.result import THESE_POSES
+from truepose.files.wording import counted
+from truepose.reporting.display import column, pose_text
+from truepose.reporting.table import Table
+from truepose.verdict.answer import BEFORE
+
+if TYPE_CHECKING:
+    from truepose.design.result import Allocation, ChosenGrade
+
+MOST_WORST = 8
+"""Worst poses that are shown; the data have all that are kept."""
+
+
+def tables(result: Allocation) -> Iterator[Table]:
+    """Everything of an allocation for people."""
+    if result.options:
+        yield options(result)
+    if result.grades:
+        yield grades(result)
+    yield contributions(result)
+    yield worst_poses(result)
+
+
+def money(result: Allocation, cost: float) -> str:
+    """A cost with its unit."""
+    return (
+        f"{cost:.4g} {result.unit}".strip()
+        if cost < 1000.0
+        else f"{cost:.0f} {result.unit}".strip()
+    )
+
+
+def options(result: Allocation) -> Table:
+    """The option of every choice."""
+    return Table(
+        "options",
+        "Options",
+        ("choice", "parts", "option", _header("cost", result.unit)),
+        tuple(
+            (one.choice, ", ".join(one.parts), one.option, f"{one.cost:.6g}")
+            for one in result.options
+        ),
+        words=3,
+    )
+
+
+def grades(result: Allocation) -> Table:
+    """The grades, those of one row of the file that are alike in one line."""
+    rows = []
+    by_grade: dict[tuple[str, str], list[ChosenGrade]] = {}
+    for one in result.grades:
+        by_grade.setdefault((one.of, one.grade), []).append(one)
+    for (of, grade), alike in by_grade.items():
+        names = ", ".join(one.name for one in alike)
+        rows.append((of, names, grade, f"{sum(one.cost for one in alike):.6g}"))
+    return Table(
+        "grades",
+        "Tolerances",
+        ("row", "what has one grade", "grade (half width)", _header("cost", result.unit)),
+        tuple(rows),
+        words=3,
+    )
+
+
+def contributions(result: Allocation) -> Table:
+    """What the worst error is made of, as filed and designed."""
+    units = result.machine.shown
+    header = ["what adds to the worst error"]
+    columns = []
+    kinds = dict.fromkeys(one.quantity for one in result.contributions)
+    for kind in kinds:
+        unit = units.error(kind)
+        own = [one for one in result.contributions if one.quantity == kind]
+        for word, values in (
+            ("as filed", [one.before for one in own]),
+            ("designed", [one.after for one in own]),
+        ):
+            header.append(f"{kind} {word}, {unit.label}")
+            columns.append(column([*(v * unit.per_si for v in values), sum(values) * unit.per_si]))
+    names = list(dict.fromkeys(one.name for one in result.contributions))
+    return Table(
+        "contributions",
+        "What the largest error is made of",
+        tuple(header),
+        tuple(zip([*names, "together"], *columns, strict=True)),
+        note="To first order, along the largest error at the worst pose of each.",
+    )
+
+
+def worst_poses(result: Allocation) -> Table:
+    """Where the design errs most."""
+    units = result.machine.shown
+    rows = []
+    for one in result.worst_poses[:MOST_WORST]:
+        unit = units.error(one.quantity)
+        cells = column([one.error * unit.per_si, one.limit * unit.per_si])
+        pose = pose_text(one.pose, result.machine.commanded, units)
+        rows.append((one.case, pose, f"{one.quantity}, {unit.label}", *cells))
+    return Table(
+        "worst",
+        "Where it binds",
+        ("condition", "pose", "error of", "largest", "limit"),
+        tuple(rows),
+        words=3,
+        note="The largest error found there, solved exactly; the limit is the target less the "
+        "reserve.",
+    )
+
+
+def sentences(result: Allocation) -> Iterator[str]:
+    """What the allocation comes to."""
+    yield (
+        f"Cost {money(result, result.cost)}; at least {money(result, result.lower_bound)} by the "
+        f"linear model at the target less {100.0 * result.reserve:.3g} %, so that the gap is "
+        f"{_percent(result.gap)} %."
+    )
+    units = result.machine.shown
+    for kind, target in result.targets.items():
+        unit = units.error(kind)
+        largest = max(
+            (one.error for one in result.worst_poses if one.quantity == kind), default=0.0
+        )
+        yield (
+            f"The {kind} {_when(result)} is within {target * unit.per_si:.4g} {unit.label}: the "
+            f"largest error found is {largest * unit.per_si:.4g} {unit.label}"
+            + (f", in {counted(len(result.cases), 'condition')}." if len(result.cases) > 1 else ".")
+        )
+    saved = sum(one.price for one in result.worst_poses) / 100.0
+    if saved > 0.0:
+        yield f"Targets 1 % wider would save some {money(result, saved)}, between grades."
+    if result.proven == THESE_POSES:
+        yield (
+            f"Proven at the {counted(result.poses_proven, 'worst pose')} found; between poses it "
+            "is searched, not proven."
+        )
+    else:
+        yield "Not proven; `truepose check` says what is found and what is known."
+    if result.impossible:
+        yield (
+            f"{result.impossible} of {counted(result.combinations, 'combination')} of options "
+            "cannot keep the target at their finest."
+        )
+    if result.left_out:
+        yield f"{counted(result.left_out, 'pose')} looked at cannot be taken, and do not count."
+
+
+def interrupted(result: Allocation) -> str:
+    """What Ctrl-C left of the search."""
+    programmes = counted(result.rounds, "programme")
+    return f"Interrupted after {programmes}: the design is the best of those judged clean by then."
+
+
+def _percent(share: float) -> str:
+    return "0" if share < 5e-5 else f"{100.0 * share:.2g}"
+
+
+def _when(result: Allocation) -> str:
+    return "before compensation" if result.state == BEFORE else "after compensation"
+
+
+def _header(name: str, unit: str) -> str:
+    return f"{name}, {unit}" if unit else name

@@ -1,0 +1,145 @@
+"""`truepose.allocate`: the cheapest design, against all designs enumerated in closed form."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truepose as tp
+from designs import file_with, row
+
+# The machine of machines/planar_two_slider.toml, in mm, N and K.
+RAILS = np.array([0.0, 600.0])
+ROD, AREA, MODULUS, EXPANSION, WARMER = 500.0, 28.2743338823, 210e3, 1.1e-5, 15.0
+FORCE = np.array([1200.0, -1500.0])
+
+LENGTHS, OFFSETS = (0.02, 0.05, 0.1), (0.01, 0.03, 0.08)
+ROWS = (
+    row("strut.*.length", bands='["20 um", "50 um", "100 um"]', cost=9.0),
+    row("drive.*.offset", bands='["10 um", "30 um", "80 um"]', cost=5.0),
+)
+COSTS = [[9.0 * 0.01 / half for half in LENGTHS], [5.0 * 0.01 / half for half in OFFSETS]]
+
+
+def tool(carriage: np.ndarray, rod: np.ndarray) -> np.ndarray:
+    """(..., 2) where two rods (..., 2) on carriages of heights (..., 2) meet, below them."""
+    across, up = RAILS[1] - RAILS[0], carriage[..., 1] - carriage[..., 0]
+    apart = np.hypot(across, up)
+    along = (rod[..., 0] ** 2 - rod[..., 1] ** 2 + apart**2) / (2.0 * apart)
+    off = np.sqrt(rod[..., 0] ** 2 - along**2)
+    x = RAILS[0] + (along * across + off * up) / apart
+    y = carriage[..., 0] + (along * up - off * across) / apart
+    return np.stack([x, y], axis=-1)
+
+
+def errors(pose: np.ndarray, rod: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """(..., 2) the error at poses (..., 2): rods that deviate by so much, carriages off by so much.
+
+    Besides, the rods are warm, and stretched by the force on the tool.
+    """
+    height = pose[..., 1:] + np.sqrt(ROD**2 - (pose[..., :1] - RAILS) ** 2)
+    run = (pose[..., :1] - RAILS) / ROD
+    rise = (pose[..., 1:] - height) / ROD
+    # What the rods pull the tool with is in balance with the force on it.
+    turned = run[..., 0] * rise[..., 1] - run[..., 1] * rise[..., 0]
+    tension = np.stack(
+        [
+            (FORCE[0] * rise[..., 1] - FORCE[1] * run[..., 1]) / turned,
+            (FORCE[1] * run[..., 0] - FORCE[0] * rise[..., 0]) / turned,
+        ],
+        axis=-1,
+    )
+    grown = ROD * EXPANSION * WARMER + tension * ROD / (MODULUS * AREA)
+    return tool(height + offset, ROD + grown + rod) - pose
+
+
+def largest(rod: tuple[float, ...], offset: tuple[float, ...], poses: np.ndarray) -> float:
+    """The largest error at the poses over all corners of the bands, mm."""
+    corners = np.array(list(product((-1.0, 1.0), repeat=4)))[:, np.newaxis]
+    size = errors(poses, corners[..., :2] * rod, corners[..., 2:] * offset)
+    return float(np.sqrt(np.square(size).sum(axis=-1)).max())
+
+
+@pytest.fixture(scope="module")
+def enumerated() -> list[tuple[float, float, tuple[int, ...]]]:
+    """Largest error and cost of all 81 designs."""
+    x, y = np.meshgrid(np.linspace(200.0, 400.0, 81), np.linspace(100.0, 300.0, 5))
+    poses = np.stack([x.ravel(), y.ravel()], axis=-1)
+    every = []
+    for grades in product(range(3), repeat=4):
+        rod = tuple(LENGTHS[grade] for grade in grades[:2])
+        offset = tuple(OFFSETS[grade] for grade in grades[2:])
+        cost = sum(COSTS[tie // 2][grade] for tie, grade in enumerate(grades))
+        every.append((largest(rod, offset, poses), cost, grades))
+    return every
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return file_with(tmp_path_factory.mktemp("planar"), "planar_two_slider", rows=ROWS)
+
+
+def test_the_closed_form_is_of_this_machine(file: Path) -> None:
+    poses = np.array([[0.3, 0.2], [0.21, 0.12]])
+    known = tp.budget(tp.load(file), poses)["overall_error"].values
+    nothing = np.zeros(2)
+    assert 1e-3 * errors(1e3 * poses, nothing, nothing) == pytest.approx(known, abs=1e-12)
+
+
+@pytest.mark.parametrize("target", [0.31, 0.385, 0.47])
+def test_the_cheapest_of_all_designs(
+    file: Path, enumerated: list[tuple[float, float, tuple[int, ...]]], target: float
+) -> None:
+    limit = 0.99 * target
+    # No design is so near the limit that rounding, or the second order, decides.
+    assert min(abs(error / limit - 1.0) for error, _, _ in enumerated) > 3e-4
+    cheapest = min(cost for error, cost, _ in enumerated if error <= limit)
+    assert cheapest > min(cost for _, cost, _ in enumerated)
+    found = tp.allocate(tp.load(file, [f"accuracy.target={target}"]), gap=0.0)
+    assert found.cost == pytest.approx(cheapest)
+    assert found.lower_bound <= cheapest
+    assert found.lower_bound == pytest.approx(cheapest, rel=1e-6)
+    assert found.proven == "these poses"
+    chosen = {grade.name: grade.halves for grade in found.grades}
+    grades = tuple(
+        halves.index(round(1e3 * chosen[name][0], 9))
+        for name, halves in (
+            ("strut.1.length", LENGTHS),
+            ("strut.2.length", LENGTHS),
+            ("drive.d1.offset", OFFSETS),
+            ("drive.d2.offset", OFFSETS),
+        )
+    )
+    error = next(error for error, _, one in enumerated if one == grades)
+    assert error <= limit
+    assert max(one.error for one in found.worst_poses) == pytest.approx(1e-3 * error, rel=1e-3)
+
+
+def test_options_are_chosen_with_the_grades(
+    file: Path, enumerated: list[tuple[float, float, tuple[int, ...]]], tmp_path: Path
+) -> None:
+    """Rods of invar, by hand: with what they cost, they are worth it for a fine target alone."""
+    choice = """[[cost.choice]]
+name = "rods"
+of = "strut.*"
+options = [
+  { name = "steel", set = {}, cost = 0 },
+  { name = "invar", set = { expansion = "1.2e-6 1/K" }, cost = 3 },
+]
+"""
+    path = file_with(tmp_path, "planar_two_slider", choice, rows=ROWS)
+    dear = [cost for error, cost, _ in enumerated if error <= 0.99 * 0.4]
+    wide = tp.allocate(tp.load(path, ["accuracy.target=0.47"]), gap=0.0)
+    assert [one.option for one in wide.options] == ["steel"]
+    fine = tp.allocate(tp.load(path, ["accuracy.target=0.4"]), gap=0.0)
+    alone = tp.allocate(
+        tp.load(file, ["accuracy.target=0.4", "strut.*.expansion=1.2e-6 1/K"]), gap=0.0
+    )
+    assert fine.cost == pytest.approx(min(min(dear), alone.cost + 3.0))
+    assert [one.option for one in fine.options] == [
+        "invar" if alone.cost + 3.0 < min(dear) else "steel"
+    ]
+    assert fine.combinations == 2

@@ -4,6 +4,6 @@ The unknowns are one grade a tie and one option a choice (`space`). Of a machine
 set, the largest error to first order at a pose, in a condition, along a direction is linear in the
 half widths (`error_model`): a cut. An integer programme of cuts (`programme`) gives the cheapest
 design that they allow, a judge (`judge`) looks where that design errs most, by the exact machine,
-and adds cuts there, until there is nothing to add (`search`). What comes out is proven at the worst
-poses (`proof`) and written as a machine file (`design_file`).
+and adds cuts there, until there is nothing to add (`option_combination`, `search`). The verdict is
+asked at the worst poses (`allocate`); a design is written as a machine file (`design_file`).
 """

@@ -138,6 +138,8 @@ class _Allocating:
             poses_proven=poses,
             combinations=len(self.space.combinations),
             impossible=outcome.impossible,
+            one_grade=outcome.alike[0],
+            one_width=outcome.alike[1],
             rounds=outcome.rounds,
             left_out=design.judgement.left_out,
             interrupted=outcome.interrupted,

@@ -11,6 +11,7 @@ cannot be assembled, there is no such number: then the design, and all that are 
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,11 @@ from truepose.machine import Machine
 
 FIRST_GAP = 0.05
 """Of the integer programme until its designs are clean."""
+
+_ALIKE = 1e-4
+"""By which share a design with one grade for all, told for comparison, may be beyond a limit."""
+
+_HALVINGS = 20
 
 _MOST_ROUNDS = 400
 """Rounds of cuts: far more than any design needed, which ended after some tens."""
@@ -42,9 +48,13 @@ class GradedDesign:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """A witness's row: `coefficients` (x,) and `known`, m or rad, and the `excess` there."""
+    """A witness's row: `coefficients` (x,) and `known`, m or rad, and the `excess` there.
+
+    `signed` (f,): what a unit of each feature's half width adds along its direction.
+    """
 
     witness: WorstPlace
+    signed: Floats
     coefficients: Floats
     known: float
     limit: float
@@ -84,6 +94,7 @@ class OptionCombination:
             assert limit is not None
             self.cuts[witness.key] = Cut(
                 witness,
+                signed[number],
                 self.rows(witness.case, signed[number]),
                 float(known[number]),
                 limit,
@@ -164,14 +175,63 @@ class OptionCombination:
         """(f,) half widths of a grade for every tie, SI."""
         return self._halves(self.space.chosen(grades))
 
+    def alike(self, *, between: bool) -> float:
+        """What it costs with all ties at one place of their lists; infinite where nothing keeps.
+
+        `between`: also between two grades, as `DesignSpace.between` says.
+        """
+        last = self.space.most_grades - 1
+        for _ in range(_MOST_ROUNDS):
+            place = self._coarsest_place(last, between=between)
+            if place is None:
+                return math.inf
+            halves, cost = self.space.between(place)
+            beyond = [
+                witness
+                for witness in self._assessed(halves, self.judge.effort.quick).exceeding
+                if witness.share > 1.0 + _ALIKE
+            ]
+            if not beyond:
+                return self.option_cost + cost
+            if any(math.isinf(witness.exact) for witness in beyond):
+                last = math.ceil(place) - 1
+            if last < 0:
+                return math.inf
+            self._cut(beyond, exact=True)
+        return math.inf
+
     # --- inside
+
+    def _coarsest_place(self, last: int, *, between: bool) -> float | None:
+        """The coarsest place from 0 to `last` that the cuts allow; None where not even 0 is."""
+        lower = next((place for place in range(last, -1, -1) if self._keeps(place)), None)
+        if lower is None or not between or lower == last:
+            return lower
+        upper = lower + 1.0
+        within = float(lower)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (within + upper)
+            within, upper = (middle, upper) if self._keeps(middle) else (within, middle)
+        return within
+
+    def _keeps(self, place: float) -> bool:
+        """Whether all ties at one place are within the cuts."""
+        halves, _ = self.space.between(place)
+        for cut in self.cuts.values():
+            member = self.judge.models[cut.witness.case].bands.member
+            own = float(np.abs((cut.signed * halves) @ member).sum())
+            if cut.known + cut.excess + own > cut.limit:
+                return False
+        return True
 
     def _halves(self, x: Floats) -> Floats:
         return np.asarray(x @ self.space.halves)
 
     def _judged(self, x: Floats, effort: Effort) -> Findings:
         """Judged without a climb first, which is only for what is clean without."""
-        halves = self._halves(x)
+        return self._assessed(self._halves(x), effort)
+
+    def _assessed(self, halves: Floats, effort: Effort) -> Findings:
         judgement = self.judge.assess(halves, effort.still)
         return judgement if judgement.exceeding else self.judge.assess(halves, effort)
 
@@ -201,9 +261,7 @@ class OptionCombination:
                 continue
             if excess == cut.excess:  # by the solver's tolerance
                 excess += (witness.share - 1.0) * cut.limit
-            self.cuts[witness.key] = Cut(
-                cut.witness, cut.coefficients, cut.known, cut.limit, excess
-            )
+            self.cuts[witness.key] = dataclasses.replace(cut, excess=excess)
             changed = True
         return changed
 

@@ -97,9 +97,11 @@ class Allocation(Represented):
     target less reserve to first order, in `unit`; `gap` between them, of the cost. `targets` by
     quantity, m or rad, kept in `state` with a share `reserve` left. `proven`: "these poses" where
     the verdict proves the targets at the worst poses, the number of them `poses_proven`, else
-    "none". `worst_poses`: the worst first. `finest`: the largest error with everything at its
-    finest, of its limit, in the options chosen. `left_out`: poses that were looked at and that the
-    machine cannot take. `interrupted`: Ctrl-C came before the gap was reached.
+    "none". `worst_poses`: the worst first. `one_grade`: what it would cost with all ties at the
+    same place of their lists, `one_width` also between two grades; infinite where that keeps
+    nothing, or there is one tie. `combinations` of options, of which some are `impossible`;
+    `rounds`: programmes solved. `left_out`: poses that were looked at and that the machine cannot
+    take. `interrupted`: Ctrl-C came before the gap was reached.
     """
 
     machine: Machine
@@ -119,6 +121,8 @@ class Allocation(Represented):
     poses_proven: int
     combinations: int
     impossible: int
+    one_grade: float
+    one_width: float
     rounds: int
     left_out: int
     interrupted: bool
@@ -198,6 +202,10 @@ def _dataset(result: Allocation) -> xr.Dataset:
         "cost": variable((), result.cost, money, "cost of the design"),
         "lower_bound": variable(
             (), result.lower_bound, money, "bound of the cost to first order, target less reserve"
+        ),
+        "cost_one_grade": variable((), result.one_grade, money, "cost with one grade for all ties"),
+        "cost_one_width": variable(
+            (), result.one_width, money, "cost with one place for all ties, also between grades"
         ),
         "grade_cost": variable(
             ("tie",), [one.cost for one in result.grades], money, "cost of the grade"

@@ -45,7 +45,8 @@ class SearchOutcome:
     """What a search comes to. `bound` of the linear model; `shortfall`: the least that is left.
 
     Of combinations that cannot be (`shortfall`) the one whose worst error, with everything at its
-    finest, is least. `rounds`: programmes solved. `interrupted`: by Ctrl-C.
+    finest, is least. `rounds`: programmes solved. `interrupted`: by Ctrl-C. `alike`: what it costs
+    with all ties at one place of their lists, at a grade and between two.
     """
 
     best: GradedDesign | None = None
@@ -55,6 +56,7 @@ class SearchOutcome:
     impossible: int = 0
     rounds: int = 0
     interrupted: bool = False
+    alike: tuple[float, float] = (math.inf, math.inf)
     bounds: dict[Combination, float] = field(default_factory=dict)
 
 
@@ -88,8 +90,13 @@ class DesignSearch:
         for combination in self.space.combinations:
             outcome.bounds[combination] = self.space.option_cost(combination) + trivial
         try:
-            for candidate in sorted(self._possible(), key=lambda one: one.bound):
+            possible = sorted(self._possible(), key=lambda one: one.bound)
+            for candidate in possible:
                 self._integer(candidate)
+            outcome.alike = (
+                self._alike(possible, between=False),
+                self._alike(possible, between=True),
+            )
         except KeyboardInterrupt:
             if outcome.best is None:
                 raise
@@ -185,6 +192,18 @@ class DesignSearch:
         self._share(candidate)
         outcome.bounds[candidate.combination] = candidate.bound_of_linear_model(0.5 * gap)
         candidate.judge.forget()
+
+    def _alike(self, possible: Sequence[OptionCombination], *, between: bool) -> float:
+        """What one grade for all costs, with the options for which that is least."""
+        least = math.inf
+        if len(self.space.ties) < 2:
+            return least
+        for candidate in possible:
+            if candidate.bound < least:
+                self._tick()
+                least = min(least, candidate.alike(between=between))
+                candidate.judge.forget()
+        return least
 
     def _share(self, candidate: OptionCombination) -> None:
         """Let other combinations begin with the cuts of this one."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from truepose.design.result import THESE_POSES
@@ -131,6 +132,12 @@ def sentences(result: Allocation) -> Iterator[str]:
             f"The {kind} {_when(result)} is within {target * unit.per_si:.4g} {unit.label}: the "
             f"largest error found is {largest * unit.per_si:.4g} {unit.label}"
             + (f", in {counted(len(result.cases), 'condition')}." if len(result.cases) > 1 else ".")
+        )
+    if isfinite(result.one_grade):
+        at_grade, at_width = money(result, result.one_grade), money(result, result.one_width)
+        yield (
+            "With all tolerances at the same place of their lists it would cost "
+            f"{at_grade}, between two grades {at_width}."
         )
     saved = sum(one.price for one in result.worst_poses) / 100.0
     if saved > 0.0:

@@ -118,6 +118,38 @@ def test_the_cheapest_of_all_designs(
     assert max(one.error for one in found.worst_poses) == pytest.approx(1e-3 * error, rel=1e-3)
 
 
+def test_one_grade_for_all_in_comparison(
+    file: Path, enumerated: list[tuple[float, float, tuple[int, ...]]]
+) -> None:
+    limit = 0.99 * 0.385
+    found = tp.allocate(tp.load(file, ["accuracy.target=0.385"]), gap=0.0)
+    alike = [(cost, error) for error, cost, grades in enumerated if len(set(grades)) == 1]
+    assert len(alike) == 3
+    assert found.one_grade == pytest.approx(min(cost for cost, error in alike if error <= limit))
+    x, y = np.meshgrid(np.linspace(200.0, 400.0, 81), [100.0, 300.0])
+    poses = np.stack([x.ravel(), y.ravel()], axis=-1)
+
+    def halves(place: float) -> tuple[float, float]:
+        lower = min(int(place), 1)
+        share = place - lower
+        widths = [
+            grades[lower] ** (1.0 - share) * grades[lower + 1] ** share
+            for grades in (LENGTHS, OFFSETS)
+        ]
+        return widths[0], widths[1]
+
+    within, beyond = 0.0, 2.0
+    for _ in range(30):
+        middle = 0.5 * (within + beyond)
+        rod, offset = halves(middle)
+        keeps = largest((rod, rod), (offset, offset), poses) <= limit
+        within, beyond = (middle, beyond) if keeps else (within, middle)
+    rod, offset = halves(within)
+    assert found.one_width == pytest.approx(2.0 * (0.09 / rod + 0.05 / offset), rel=1e-3)
+    assert found.cost < found.one_grade
+    assert found.one_width < found.one_grade
+
+
 def test_options_are_chosen_with_the_grades(
     file: Path, enumerated: list[tuple[float, float, tuple[int, ...]]], tmp_path: Path
 ) -> None:

@@ -30,6 +30,7 @@ from truepose.machine import Machine
 from truepose.runs.arguments import checked
 from truepose.runs.poses import Progress
 from truepose.runs.quantities import quantities
+from truepose.runs.run import Run
 from truepose.verdict.accuracy import accuracy, required_states
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET
 
@@ -65,8 +66,8 @@ def allocate(
     solved, 0). Ctrl-C gives the best design and the bound of then.
 
     Raises `RequestError`: no-cost, bad-allocation, option-not-set, bad-gap, no-accuracy,
-    unknown-choice, no-workspace, extra-missing; target-out-of-reach where no choice keeps the
-    targets, with the pose and what is left.
+    unknown-choice, no-workspace, no-pose-left, extra-missing; target-out-of-reach where no choice
+    keeps the targets, with the pose and what is left.
     """
     (asked,) = _state(state)
     space = DesignSpace(machine)
@@ -299,6 +300,9 @@ class _Allocating:
         options = ", ".join(option.name for option in self.space.options(combination))
         of_options = f", with {options}" if options else ""
         if witness is None:
+            run = Run(self.machine)
+            if not any(True for _ in run.with_variables()):
+                return run.no_pose_left()
             return RequestError(
                 Problem(
                     "target-out-of-reach",

@@ -81,11 +81,13 @@ def _written(
     *,
     by_patterns: bool,
 ) -> MachineText:
-    read = load_text(machine.file, content, settings=settings, registry=REGISTRY)
+    assert machine.costs is not None
+    path = machine.costs.path(machine.file)
+    read = load_text(path, content, settings=settings, registry=REGISTRY)
     changed = RequestError(
         Problem("machine-file-changed", "the file changed while it was edited", machine.file)
     )
-    text = MachineText(Path(machine.file), read, changed, content)
+    text = MachineText(path, read, changed, content)
     bands = allocated_bands(read, list(wanted), [0] * len(wanted))
     _Edit(text, read, bands, wanted).write(by_patterns=by_patterns)
     return text
@@ -93,7 +95,8 @@ def _written(
 
 def _is_design(machine: Machine, content: str, wanted: Mapping[str, tuple[float, str]]) -> bool:
     """Whether the machine of a text has the half widths that are wanted."""
-    written = load_text(machine.file, content, registry=REGISTRY)
+    assert machine.costs is not None
+    written = load_text(machine.costs.path(machine.file), content, registry=REGISTRY)
     bands = allocated_bands(written, list(wanted), [0] * len(wanted))
     halves = np.array([half for half, _ in wanted.values()])
     return bool((np.abs(bands.filed - halves) <= _SAME * halves).all())

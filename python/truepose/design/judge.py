@@ -253,6 +253,8 @@ class Judge:
         effort: Effort,
     ) -> list[WorstPlace]:
         """What is found at poses (n, d): the linear corner solved exactly, and one step further."""
+        if not len(poses):
+            return []
         model = self.models[case]
         errors = model.at(poses)
         usable = errors.usable

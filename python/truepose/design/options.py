@@ -53,7 +53,7 @@ def _loaded(
     every = dict(machine.settings)
     every |= dict(setting.split("=", 1) for setting in settings)
     try:
-        changed = load_text(machine.file, costs.text, settings=every, registry=REGISTRY)
+        changed = load_text(costs.path(machine.file), costs.text, settings=every, registry=REGISTRY)
     except (MachineFileError, RequestError) as error:
         first = error.problems[0]
         raise _refused(machine, choice, option, first.message, first.found, first.hint) from None

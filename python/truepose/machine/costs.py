@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from truepose.representation import Facts, Represented
 
@@ -118,6 +119,10 @@ class Costs(Represented):
     choices: tuple[DesignChoice, ...]
     text: str = field(repr=False)
     folder: str = field(repr=False)
+
+    def path(self, name: str) -> Path:
+        """Where a machine file called `name` is, so that it finds its data files."""
+        return Path(self.folder) / Path(name).name
 
     def _facts(self) -> Facts:
         yield "unit", self.unit or None

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from truepose.machine import Machine
 
 ENDING = ".toml"
+MOST_TARGETS = 1000
+"""Of a curve."""
 
 
 @click.command("allocate")
@@ -55,6 +57,12 @@ ENDING = ".toml"
         help="By which share of its cost the design may be dearer than the cheapest.",
     ),
     click.option(
+        "--curve",
+        metavar="FROM:TO:COUNT",
+        help="Instead of a design, what it costs for so many position targets, such as "
+        '"0.1 mm:0.2 mm:5".',
+    ),
+    click.option(
         "--output",
         "-o",
         "output",
@@ -77,7 +85,14 @@ ENDING = ".toml"
     verbose_option,
 )
 def command(
-    *, before: bool, worst: bool, reserve: str, gap: str, output: Path | None, **options: Any
+    *,
+    before: bool,
+    worst: bool,
+    reserve: str,
+    gap: str,
+    curve: str | None,
+    output: Path | None,
+    **options: Any,
 ) -> int:
     """Choose tolerances and options at least cost.
 
@@ -98,6 +113,10 @@ def command(
         require_writable(output, [ENDING], [request.machine_file])
     machine = _steps.load_machine(request.machine_file, request.settings)
     shares = _share(machine, "--reserve", reserve), _share(machine, "--gap", gap)
+    if curve is not None:
+        if output is not None:
+            raise click.UsageError("--curve has several designs: it goes without --output.")
+        return _curve(request, machine, curve, shares, before=before, worst=worst)
     with progress("allocation", "programmes", first="a design of the finest grades") as report:
         allocation = truepose.allocate(
             machine,
@@ -125,6 +144,66 @@ def command(
         for sentence in words.sentences(allocation):
             click.echo(sentence, err=True)
     return INTERRUPTED if allocation.interrupted else 0
+
+
+def _curve(
+    request: Request,
+    machine: Machine,
+    text: str,
+    shares: tuple[float, float],
+    *,
+    before: bool,
+    worst: bool,
+) -> int:
+    """Costs against targets -> exit code."""
+    from truepose.cli import _steps
+    from truepose.cli._progress import progress
+    from truepose.design.cost_curve import cost_curve
+    from truepose.reporting import allocation as words
+    from truepose.reporting.result import Result
+    from truepose.verdict.answer import AFTER, BEFORE
+
+    targets = _targets(machine, text)
+    with progress("cost curve", "targets", first="the widest target") as report:
+        curve = cost_curve(
+            machine,
+            targets,
+            state=BEFORE if before else AFTER,
+            worst=worst,
+            reserve=shares[0],
+            gap=shares[1],
+            progress=report,
+        )
+    if curve.interrupted:
+        click.echo(f"Interrupted after {len(curve.points)} of {len(targets)} targets.", err=True)
+    _steps.deliver(request, Result("allocate", machine, curve.dataset), [words.curve(curve)])
+    return INTERRUPTED if curve.interrupted else 0
+
+
+def _targets(machine: Machine, text: str) -> list[float]:
+    """Position targets, m, of "0.1 mm:0.2 mm:5"; bare numbers are lengths of the file."""
+    from truepose.errors import Problem, ReadingError, RequestError
+    from truepose.files.units import UnitSystem
+
+    parts = text.split(":")
+    try:
+        if len(parts) == 3 and parts[2].strip().isdecimal():
+            count = int(parts[2])
+            units = UnitSystem(machine.file_units)
+            start, stop = (units.read(part.strip(), "length") for part in parts[:2])
+            if 1 <= count <= MOST_TARGETS and start > 0.0 and stop > 0.0:
+                step = (stop - start) / max(count - 1, 1)
+                return [start + number * step for number in range(count)]
+    except ReadingError:
+        pass
+    raise RequestError(
+        Problem(
+            "bad-allocation",
+            "--curve cannot be read",
+            found=text,
+            expected=f'"0.1 mm:0.2 mm:5": two targets above zero, and 1 to {MOST_TARGETS} of them',
+        )
+    )
 
 
 def _share(machine: Machine, option: str, text: str) -> float:

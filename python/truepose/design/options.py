@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 from truepose.design.space import Combination, DesignSpace
@@ -21,7 +22,9 @@ def machine_of(machine: Machine, space: DesignSpace, combination: Combination) -
         return machine
     first = space.slots[0].choice
     option = first.options[combination[0]]
-    return _loaded(machine, space, space.option_settings(combination), first, option)
+    changed = _loaded(machine, space, space.option_settings(combination), first, option)
+    # What is asked is not the options' to say, and may have been changed since the file was read.
+    return dataclasses.replace(changed, accuracy=machine.accuracy)
 
 
 def require_options(machine: Machine, space: DesignSpace) -> None:

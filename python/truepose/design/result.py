@@ -169,6 +169,11 @@ class Allocation(Represented):
         return _dataset(self)
 
 
+def money_unit(unit: str) -> str:
+    """The unit of a cost in a result: one that is called like a length would be converted."""
+    return "1" if not unit or unit in BY_UNIT else unit
+
+
 def _dataset(result: Allocation) -> xr.Dataset:
     machine = result.machine
     kinds = list(quantities(machine.components))
@@ -193,8 +198,7 @@ def _dataset(result: Allocation) -> xr.Dataset:
     def variable(dims: tuple[str, ...], values: object, unit: str, meaning: str) -> xr.Variable:
         return data_variable(Variable(dims, unit, meaning), values, units)
 
-    # A currency that is called like a unit of length would be converted like one.
-    money = "1" if not result.unit or result.unit in BY_UNIT else result.unit
+    money = money_unit(result.unit)
     halves = np.array([one.halves[at] for one, at in rows], np.float64)
     over = ("worst", "quantity")
     data = {
@@ -285,4 +289,5 @@ __all__ = [
     "ChosenOption",
     "Contribution",
     "WorstPose",
+    "money_unit",
 ]

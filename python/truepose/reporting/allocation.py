@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from truepose.design.cost_curve import options_text
 from truepose.design.result import THESE_POSES
 from truepose.files.wording import counted
 from truepose.reporting.display import column, pose_text
@@ -13,6 +14,7 @@ from truepose.reporting.table import Table
 from truepose.verdict.answer import BEFORE
 
 if TYPE_CHECKING:
+    from truepose.design.cost_curve import CostCurve
     from truepose.design.result import Allocation, ChosenGrade
 
 MOST_WORST = 8
@@ -156,6 +158,33 @@ def sentences(result: Allocation) -> Iterator[str]:
         )
     if result.left_out:
         yield f"{counted(result.left_out, 'pose')} looked at cannot be taken, and do not count."
+
+
+def curve(result: CostCurve) -> Table:
+    """What the machine costs against its position target."""
+    assert result.machine.costs is not None
+    unit, money_of = result.machine.shown.error("position"), result.machine.costs.unit
+    return Table(
+        "curve",
+        "Cost against target",
+        (
+            f"target, {unit.label}",
+            _header("cost", money_of),
+            _header("at least", money_of),
+            "options",
+        ),
+        tuple(
+            (
+                f"{point.target * unit.per_si:.6g}",
+                f"{point.cost:.6g}" if isfinite(point.cost) else "out of reach",
+                f"{point.lower_bound:.6g}" if isfinite(point.cost) else "",
+                options_text(point),
+            )
+            for point in result.points
+        ),
+        words=0,
+        note="Position targets; all else as the file has it.",
+    )
 
 
 def interrupted(result: Allocation) -> str:

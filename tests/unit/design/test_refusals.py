@@ -134,11 +134,13 @@ def test_a_share_of_all_machines(tmp_path: Path, capsys: Capture) -> None:
     problem = refused(path, "accuracy.at=95 %")
     assert problem.code == "bad-allocation"
     assert problem.path == "accuracy.at"
+    option = '{ name = "as drawn", set = {}, cost = 0 }'
+    path = file_with(tmp_path, "planar_two_slider", choice(option), rows=ROWS)
     done = call(capsys, "allocate", path, "--set", "accuracy.at=95 %", "--worst")
     assert done.code == 0
-    assert tp.allocate(tp.load(path, ["accuracy.at=95 %"]), worst=True).cost == pytest.approx(
-        tp.allocate(tp.load(path)).cost
-    )
+    found = tp.allocate(tp.load(path, ["accuracy.at=95 %"]), worst=True)
+    assert found.cost == pytest.approx(tp.allocate(tp.load(path)).cost)
+    assert found.proven == "these poses"
 
 
 def test_a_group_in_part(tmp_path: Path) -> None:

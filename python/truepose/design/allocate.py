@@ -83,10 +83,10 @@ def allocate(
         _gap(gap),
         THOROUGH,
     )
-    return _Allocating(judged, space, task, asked, targets, reserve, progress).result()
+    return OneAllocation(judged, space, task, asked, targets, reserve, progress).result()
 
 
-class _Allocating:
+class OneAllocation:
     """One allocation, from the search to its result."""
 
     def __init__(
@@ -103,7 +103,7 @@ class _Allocating:
         self.targets, self.reserve = targets, reserve
         self.kinds = list(quantities(machine.components))
         self.cases = list(task.conditions)
-        self.search = DesignSearch(space, task, self._beyond, progress)
+        self.search = DesignSearch(space, task, self.beyond, progress)
         self._proven: dict[tuple[object, ...], tuple[str, int]] = {}
 
     def result(self) -> Allocation:
@@ -113,7 +113,7 @@ class _Allocating:
             raise self._out_of_reach(outcome)
         design, candidate = outcome.best, outcome.candidate
         if not outcome.interrupted and self._key(design) not in self._proven:
-            self._beyond(candidate, design)
+            self.beyond(candidate, design)
         proven, poses = self._proven.get(self._key(design), (NOT_PROVEN, 0))
         chosen = machine_of(self.machine, self.space, design.combination)
         bands = self.search.bands(chosen)
@@ -150,7 +150,7 @@ class _Allocating:
 
     # --- the proof
 
-    def _beyond(self, candidate: OptionCombination, design: GradedDesign) -> list[WorstPlace]:
+    def beyond(self, candidate: OptionCombination, design: GradedDesign) -> list[WorstPlace]:
         """Ask the verdict at the worst poses; what it finds beyond the targets, as witnesses."""
         halves = candidate.halves(design.grades)
         machine = candidate.judge.models[0].bands.designed(halves)

@@ -153,14 +153,14 @@ class OptionCombination:
             exceeding = design.judgement.exceeding
             if not exceeding:
                 return design
-            self._cut(exceeding, exact=True)
-            if any(math.isinf(witness.exact) for witness in exceeding):
-                self._too_coarse.append(solution.x)
+            self.cut(exceeding, design)
         return None
 
-    def cut(self, witnesses: Sequence[WorstPlace]) -> None:
-        """Take what was found beyond its limit after the judge found nothing."""
+    def cut(self, witnesses: Sequence[WorstPlace], design: GradedDesign) -> None:
+        """Cut off a design of which `witnesses` were found beyond their limits."""
         self._cut(witnesses, exact=True)
+        if any(math.isinf(witness.exact) for witness in witnesses):
+            self._too_coarse.append(self.space.chosen(design.grades))
 
     def bound_of_linear_model(self, gap: float) -> float:
         """The bound of whole grades under the cuts of the linear model alone."""

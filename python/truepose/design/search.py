@@ -17,7 +17,7 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.design.allocated_bands import AllocatedBands, allocated_bands
 from truepose.design.error_model import ErrorModel
-from truepose.design.judge import BY_ROUNDING, THOROUGH, Effort, Judge, WorstPlace
+from truepose.design.judge import THOROUGH, Effort, Judge, WorstPlace
 from truepose.design.judged_poses import JudgedPoses
 from truepose.design.option_combination import GradedDesign, OptionCombination
 from truepose.design.options import machine_of
@@ -188,7 +188,7 @@ class DesignSearch:
             if not beyond:
                 self._better(candidate, design)
                 break
-            candidate.cut(beyond)
+            candidate.cut(beyond, design)
         self._share(candidate)
         outcome.bounds[candidate.combination] = candidate.bound_of_linear_model(0.5 * gap)
         candidate.judge.forget()
@@ -217,9 +217,4 @@ def at_worst(witnesses: Sequence[WorstPlace], count: int) -> list[tuple[int, Flo
     return list(poses.values())[:count]
 
 
-def beyond(share: float) -> bool:
-    """Whether an error is beyond its limit by more than rounding."""
-    return not share <= 1.0 + BY_ROUNDING
-
-
-__all__ = ["Confirm", "DesignSearch", "SearchOutcome", "Task", "at_worst", "beyond"]
+__all__ = ["Confirm", "DesignSearch", "SearchOutcome", "Task", "at_worst"]

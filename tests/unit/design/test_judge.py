@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,3 +121,27 @@ def test_the_bound_is_below_every_design_of_a_local_search(tmp_path: Path) -> No
         cost = sum(row.costs[grade][tie] for (row, tie), grade in zip(ties, grades, strict=True))
         assert found.lower_bound <= cost
         assert any(grades)
+
+
+def test_what_the_verdict_finds_cuts_the_design_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of cheap designs it tells that they cannot be assembled, or err: a dearer one is chosen."""
+    machine = machine_of(tmp_path, "planar_two_slider")
+    cheapest = tp.allocate(machine, gap=0.0).cost
+    own = allocating.OneAllocation.beyond
+    for size in (float("inf"), 0.6e-3):
+
+        def beyond_it(self: Any, candidate: Any, design: Any, size: float = size) -> list[Any]:
+            clean = own(self, candidate, design)
+            if design.cost > 1.5 * cheapest:
+                return clean
+            worst = design.judgement.witnesses[0]
+            assert not clean
+            return [dataclasses.replace(worst, exact=size, share=size / 0.495e-3)]
+
+        monkeypatch.setattr(allocating.OneAllocation, "beyond", beyond_it)
+        found = tp.allocate(machine, gap=0.0)
+        assert found.cost > 1.5 * cheapest
+        assert found.lower_bound == pytest.approx(cheapest, rel=1e-6)
+        assert found.gap > 0.3

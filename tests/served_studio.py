@@ -21,7 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from truepose.studio.messages import MOST_SENT, SENT
 
-LIMIT = 120.0
+LIMIT = 240.0
 """s; what does not answer until then never will."""
 
 

@@ -9,7 +9,7 @@ from browser import Heard
 from served_studio import ServedStudio
 from studio_soak.window_work import Sizes
 
-PATIENCE = 120_000
+PATIENCE = 240_000
 """Milliseconds: a busy machine is slow, and slowness is no fault here."""
 
 READY = "html[data-studio-ready=yes]"

@@ -21,6 +21,7 @@ import numpy as np
 
 import truepose as tp
 from benchmarks.hexapod import MACHINE
+from benchmarks.live_page import DRAGGED
 from benchmarks.rows import Row
 
 EDITS, TYPED_EDITS, STEPS = 32, 20, 60
@@ -70,19 +71,6 @@ TYPED = """async ([key, value]) => {
   const own = performance.now() - begun;
   await drawn;
   return [own + globalThis.heard, performance.now() - begun];
-}"""
-DRAGGED = """async steps => {
-  const place = document.getElementById("live"), taken = [];
-  const range = place.querySelector('[data-of="pose.x"] input[type=range]');
-  const [low, high] = [Number(range.min), Number(range.max)];
-  for (let step = 0; step < steps; step++) {
-    const before = place.dataset.steps;
-    range.value = low + (high - low) * (0.35 + 0.3 * step / steps);
-    range.dispatchEvent(new Event("input"));
-    while (place.dataset.steps === before) await new Promise(done => setTimeout(done, 2));
-    taken.push(Number(place.dataset.step));
-  }
-  return taken;
 }"""
 
 Edit = tuple[str, str]

@@ -13,3 +13,11 @@ def missing(what: str) -> NoReturn:
     if os.environ.get("TRUEPOSE_CI"):
         pytest.fail(what)
     pytest.skip(what)
+
+
+def require_web_kernel() -> None:
+    """Skip the test where the kernel for pages was not built; in CI, fail it."""
+    from truepose.reporting.live import part
+
+    if not part.is_built():
+        missing("the kernel for browsers is not built: make web")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from command_line import PLANAR, call
-from system_package import missing
+from system_package import require_web_kernel
 from truepose.reporting.live import part
 
 Capture = pytest.CaptureFixture[str]
@@ -28,8 +28,7 @@ def test_a_page_is_refused_without_its_kernel(
 def test_ctrl_c_while_it_is_written_leaves_the_old_page(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Capture
 ) -> None:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
+    require_web_kernel()
     output = tmp_path / "live.html"
     output.write_text("old")
     halves: list[Path] = []

@@ -15,9 +15,8 @@ from command_line import MACHINES
 from firefox import Firefox, opened_firefox
 from live_visit import DRAWN, PATIENCE, QUICK, SHOWN, LiveVisit, moved
 from sweeps import thinned
-from system_package import missing
+from system_package import require_web_kernel
 from truepose.cli import run
-from truepose.reporting.live import part
 
 TEXTS = """() => {
   const texts = {}, live = document.getElementById("live");
@@ -37,8 +36,7 @@ CANVASES = ("machine", "map", "distribution")
 
 @pytest.fixture(scope="module")
 def firefox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
+    require_web_kernel()
     with opened_firefox(tmp_path_factory.mktemp("firefox")) as tab:
         yield tab
 

@@ -16,7 +16,7 @@ import truepose as tp
 from browser import Heard, opened_browser
 from build_machine import MACHINES
 from document_blocks import ROOT
-from system_package import missing
+from system_package import require_web_kernel
 from truepose.machine.library import machines
 from truepose.reporting.live import page, part
 
@@ -48,8 +48,7 @@ def live_pages() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def gallery(live_pages: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
+    require_web_kernel()
     folder = tmp_path_factory.mktemp("gallery") / "live"
     live_pages.write(folder, KINDS)
     for kind in KINDS:

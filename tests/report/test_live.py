@@ -17,15 +17,13 @@ from browser import Heard, opened_browser
 from command_line import MACHINES
 from live_visit import PATIENCE, QUICK, SHOWN, STEP, WORD, LiveVisit, moved
 from sweeps import thinned
-from system_package import missing
+from system_package import require_web_kernel
 from truepose.cli import run
-from truepose.reporting.live import part
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
+    require_web_kernel()
     with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
         yield context
 

@@ -15,7 +15,7 @@ import truepose as tp
 from browser import Heard, opened_browser
 from command_line import PLANAR
 from live_visit import DRAWN, NUMBER, PATIENCE, SETTLED, STEP
-from system_package import missing
+from system_package import require_web_kernel
 from truepose.reporting.live import part
 from truepose.reporting.live.framed import HEIGHT, MOST
 from truepose.reporting.shell import policy
@@ -27,8 +27,7 @@ SCROLLS = """() => document.documentElement.scrollHeight
 
 
 def needs_kernel() -> None:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
+    require_web_kernel()
 
 
 @pytest.fixture(scope="module")

@@ -11,14 +11,12 @@ import pytest
 from browser import opened_browser
 from served_studio import ServedStudio
 from studio_visit import Visit, visited
-from system_package import missing
-from truepose.reporting.live import part
+from system_package import require_web_kernel
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
+    require_web_kernel()
     with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
         yield context
 

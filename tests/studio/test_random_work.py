@@ -19,8 +19,7 @@ from studio_soak import LARGEST_GROWTH, Outcome, broken, grown, soak
 from studio_soak.memory import Reading
 from studio_soak.numbers import OfCommands, differences
 from sweeps import sweep
-from system_package import missing
-from truepose.reporting.live import part
+from system_package import require_web_kernel
 from truepose.studio.answers import Question, known, verdict
 
 PLANAR = MACHINES / "planar_two_slider.toml"
@@ -34,8 +33,7 @@ COMPLAINS = "setTimeout(() => { throw new Error('of the page'); }, 2000);"
 
 @pytest.fixture
 def needed() -> None:
-    if not part.is_built():
-        missing("the kernel for browsers is not built: make web")
+    require_web_kernel()
 
 
 @sweep

@@ -182,3 +182,21 @@ def takes(*options: Callable[[Command], Command]) -> Callable[[Command], Command
         return command
 
     return decorate
+
+
+def read_share(option: str, text: str, *, code: str, expected: str) -> float:
+    """A share, such as 98 % or 0.98. Raises `RequestError` with the `code` where it is none."""
+    from truepose.errors import Problem, ReadingError, RequestError
+    from truepose.files.units import UnitSystem
+
+    try:
+        return UnitSystem({}).read(text.strip(), "ratio")
+    except ReadingError as failure:
+        raise RequestError(
+            Problem(
+                code,
+                f"{option}: {failure.message}",
+                found=failure.found or text,
+                expected=expected,
+            )
+        ) from None

@@ -13,6 +13,7 @@ from truepose.cli._options import (
     Request,
     _note_format,
     machine_argument,
+    read_share,
     set_option,
     takes,
 )
@@ -112,7 +113,7 @@ def command(
     if output is not None:
         require_writable(output, [ENDING], [request.machine_file])
     machine = _steps.load_machine(request.machine_file, request.settings)
-    shares = _share(machine, "--reserve", reserve), _share(machine, "--gap", gap)
+    shares = _share("--reserve", reserve), _share("--gap", gap)
     if curve is not None:
         if output is not None:
             raise click.UsageError("--curve has several designs: it goes without --output.")
@@ -206,19 +207,7 @@ def _targets(machine: Machine, text: str) -> list[float]:
     )
 
 
-def _share(machine: Machine, option: str, text: str) -> float:
-    """A share, "1 %" or 0.01."""
-    from truepose.errors import Problem, ReadingError, RequestError
-    from truepose.files.units import UnitSystem
-
-    try:
-        return UnitSystem(machine.file_units).read(text.strip(), "ratio")
-    except ReadingError as failure:
-        raise RequestError(
-            Problem(
-                "bad-allocation",
-                f"{option} cannot be read",
-                found=failure.found or text,
-                expected='a share, such as "1 %" or 0.01',
-            )
-        ) from None
+def _share(option: str, text: str) -> float:
+    return read_share(
+        option, text, code="bad-allocation", expected='a share, such as "1 %" or 0.01'
+    )

@@ -15,6 +15,7 @@ from truepose.cli._options import (
     WholeNumber,
     format_option,
     machine_argument,
+    read_share,
     seed_option,
     set_option,
     takes,
@@ -131,7 +132,12 @@ def command(
             seed=seed,
             settings=request.settings,
             quantities=names,
-            reach=_read_share(reach),
+            reach=read_share(
+                "--reach",
+                reach,
+                code="bad-reach",
+                expected='a share of the poses, such as "98 %" or 0.98',
+            ),
         )
         say_machine(prepared.machine)
     if output is None:
@@ -159,24 +165,6 @@ def command(
     _show(prepared, result, request.format)
     note_written(output)
     return 0
-
-
-def _read_share(text: str) -> float:
-    """`98 %`, or 0.98. Raises `RequestError` (bad-reach)."""
-    from truepose.errors import Problem, ReadingError, RequestError
-    from truepose.files.units import UnitSystem
-
-    try:
-        return UnitSystem({}).read(text.strip(), "ratio")
-    except ReadingError as failure:
-        raise RequestError(
-            Problem(
-                "bad-reach",
-                f"--reach: {failure.message}",
-                found=failure.found,
-                expected='a share of the poses, such as "98 %" or 0.98',
-            )
-        ) from None
 
 
 def _show(prepared: PreparedStudy, result: xr.Dataset, form: str) -> None:

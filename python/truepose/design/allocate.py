@@ -107,7 +107,7 @@ class OneAllocation:
         self._proven: dict[tuple[object, ...], tuple[str, int]] = {}
 
     def result(self) -> Allocation:
-        """DesignSearch, and say what came of it."""
+        """Search, and say what came of it."""
         outcome = self.search.run()
         if outcome.best is None or outcome.candidate is None:
             raise self._out_of_reach(outcome)

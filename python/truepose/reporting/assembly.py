@@ -233,8 +233,8 @@ def _at_95(study: Study, watcher: Watcher) -> tuple[Answer, ...]:
 
     The verdict's, where it is at that coverage.
     """
-    from truepose.verdict.accuracy import at_coverage
-    from truepose.verdict.coverage import QUICK, QUICK_DRAWS, QUICK_POSES
+    from truepose.verdict.accuracy import at_quick_coverage
+    from truepose.verdict.coverage import QUICK
     from truepose.verdict.states import Population
 
     machine = study.machine
@@ -243,15 +243,7 @@ def _at_95(study: Study, watcher: Watcher) -> tuple[Answer, ...]:
     with watcher.progress("coverage") as report:
         population = Population(machine, progress=report)
         return tuple(
-            at_coverage(
-                population,
-                state,
-                kind,
-                QUICK,
-                None,
-                most_poses=QUICK_POSES,
-                most_draws=QUICK_DRAWS,
-            )
+            at_quick_coverage(population, state, kind)
             for state in STATES
             for kind in quantities(machine.components)
         )

@@ -23,9 +23,8 @@ from truepose.machine import Machine
 from truepose.runs.dataset import Schema, Variable
 from truepose.runs.quantities import quantities
 from truepose.sources import REGISTRY as SOURCES
-from truepose.verdict.accuracy import answers, at_coverage
-from truepose.verdict.answer import STATES, Answer
-from truepose.verdict.coverage import QUICK, QUICK_DRAWS, QUICK_POSES
+from truepose.verdict.accuracy import answers, at_quick_coverage
+from truepose.verdict.answer import STATES
 from truepose.verdict.states import Population
 
 SOURCE_NAMES = tuple(source.name for source in SOURCES)
@@ -161,19 +160,13 @@ class Coverage95(StudiedQuantity):
     @staticmethod
     def of(variant: EvaluatedVariant) -> dict[str, np.ndarray]:
         """(state, quantity)."""
-
-        def answer(state: str, kind: str) -> Answer:
-            return at_coverage(
-                variant.population,
-                state,
-                kind,
-                QUICK,
-                None,
-                most_poses=QUICK_POSES,
-                most_draws=QUICK_DRAWS,
-            )
-
-        values = [[answer(state, kind).linear.value for kind in variant.kinds] for state in STATES]
+        values = [
+            [
+                at_quick_coverage(variant.population, state, kind).linear.value
+                for kind in variant.kinds
+            ]
+            for state in STATES
+        ]
         return {"coverage_95": np.array(values)}
 
 

@@ -181,9 +181,10 @@ def test_a_machine_is_its_file_and_its_settings(tmp_path: Path) -> None:
 
 
 def test_a_share_is_read_as_one() -> None:
-    from truepose.cli.study import _read_share
+    from truepose.cli._options import read_share
     from truepose.files.units import UnitSystem
 
     for text in ("98 %", "0.98", "98%"):
-        assert _read_share(text) == pytest.approx(0.98)
-        assert _read_share(text) == read_ratio(text, UnitSystem({}))
+        share = read_share("--reach", text, code="bad-reach", expected="a share")
+        assert share == pytest.approx(0.98)
+        assert share == read_ratio(text, UnitSystem({}))

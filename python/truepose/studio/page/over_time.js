@@ -1,7 +1,5 @@
 // The tab of the error over time, at the pose shown, over the file's temperature log.
 
-const TIME_EDGE = {left: 60, right: 12, top: 12, bottom: 30};
-
 const overTimeTab = {
   name: "over_time", asked: true,
   build(host, {said, tell, numbers}) {
@@ -11,26 +9,16 @@ const overTimeTab = {
     let shown = null;
 
     function draw() {
-      const {width, height} = plane.begin();
-      if (!shown) return;
-      const name = select.value, unit = numbers.ofError(name), times = shown.time;
-      const most = roundUp(Math.max(...shown.error[name], 1e-12) / unit.si * 1.05, [1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
-      const [from, to] = [times[0], times.at(-1)], wide = width - TIME_EDGE.left - TIME_EDGE.right;
-      const high = height - TIME_EDGE.top - TIME_EDGE.bottom;
-      const x = time => TIME_EDGE.left + wide * (to > from ? (time - from) / (to - from) : 0);
-      const y = value => TIME_EDGE.top + high * (1 - value / most);
-      const step = roundUp(most / 4), decimals = Math.max(0, -Math.floor(Math.log10(step)));
-      for (let tick = 0; tick <= most * (1 + 1e-9); tick += step) {
-        plane.line([[TIME_EDGE.left, y(tick)], [width - TIME_EDGE.right, y(tick)]], "line", 1);
-        plane.text(numbers.fixed(tick, decimals), [TIME_EDGE.left - 6, y(tick)], "quiet",
-          {align: "right", base: "middle"});
-      }
+      if (!shown) { plane.begin(); return; }
+      const name = select.value, times = shown.time, [from, to] = [times[0], times.at(-1)];
+      const {x, y, low} = chartOf(plane, numbers, name, Math.max(...shown.error[name]));
+      const at = time => x(to > from ? (time - from) / (to - from) : 0);
       const every = roundUp((to - from) / 3600 / 5 || 1);
       for (let tick = Math.ceil(from / 3600 / every) * every; tick <= to / 3600 + 1e-9; tick += every) {
         plane.text(`${numbers.fixed(tick, Math.max(0, -Math.floor(Math.log10(every))))} h`,
-          [x(3600 * tick), height - 10], "quiet", {align: "center"});
+          [at(3600 * tick), low], "quiet", {align: "center"});
       }
-      plane.line(times.map((time, at) => [x(time), y(shown.error[name][at] / unit.si)]), "before", 2);
+      plane.line(times.map((time, number) => [at(time), y(shown.error[name][number])]), "before", 2);
     }
 
     select.addEventListener("change", draw);

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SCRIPTS = (
     "socket.js", "standing.js", "shown.js", "without_kernel.js",
     "stepped.js", "field_row.js", "fields.js", "changes.js", "dialogs.js",
-    "tables.js", "answers.js", "witness.js", "sources.js", "shares.js",
+    "tables.js", "chart.js", "answers.js", "witness.js", "sources.js", "shares.js",
     "budget.js", "over_time.js", "part.js", "dropped_files.js", "calibration.js", "studies.js",
     "modes.js", "tabs.js", "studio.js",
 )  # fmt: skip

@@ -1,8 +1,6 @@
 // The tab of studies: the variants of a store in the machine's folder, how large their errors are over
 // what was varied, and a button that sets one.
 
-const STUDY_EDGE = {left: 84, right: 14, top: 12, bottom: 30};
-
 const studiesTab = {
   name: "studies", asked: true,
   build(host, {said, words, tell, numbers, say, ask}) {
@@ -27,34 +25,25 @@ const studiesTab = {
       if (names.includes(before)) select.value = before;
     }
 
-    // Each error is a dot, the best one filled; what is asked is a line.
+    // Each variant is a dot, the best one filled; what is asked is a line.
     function draw() {
-      const {width, height} = plane.begin(), study = shown && shown.study;
-      if (!study || !study.drawn.numbers.length || !axis.value) return;
-      const unit = numbers.ofError(quantity.value), asked = study.asked[quantity.value];
-      const across = study.drawn.axes[axis.value], sizes = study.drawn.sizes[quantity.value];
-      const largest = Math.max(...sizes.filter(size => size !== null), asked || 0, 1e-12);
-      const most = roundUp(largest / unit.si * 1.05, [1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
-      const [low, high] = [Math.min(...across), Math.max(...across)];
-      const wide = width - STUDY_EDGE.left - STUDY_EDGE.right, tall = height - STUDY_EDGE.top - STUDY_EDGE.bottom;
-      const x = value => STUDY_EDGE.left + wide * (high > low ? (value - low) / (high - low) : 0.5);
-      const y = value => STUDY_EDGE.top + tall * (1 - value / most);
-      const step = roundUp(most / 4), decimals = Math.max(0, -Math.floor(Math.log10(step)));
-      for (let tick = 0; tick <= most * (1 + 1e-9); tick += step) {
-        const label = tick + step > most * (1 + 1e-9) ? `\u00a0${unit.label}` : "";
-        plane.line([[STUDY_EDGE.left, y(tick)], [width - STUDY_EDGE.right, y(tick)]], "line", 1);
-        plane.text(numbers.fixed(tick, decimals) + label, [STUDY_EDGE.left - 6, y(tick)], "quiet", {align: "right", base: "middle"});
-      }
-      const unitAcross = study.units[study.variables.indexOf(axis.value)];
+      const study = shown && shown.study;
+      if (!study || !study.drawn.numbers.length || !axis.value) { plane.begin(); return; }
+      const asked = study.asked[quantity.value], across = study.drawn.axes[axis.value];
+      const sizes = study.drawn.sizes[quantity.value], [low, high] = [Math.min(...across), Math.max(...across)];
+      const chart = chartOf(plane, numbers, quantity.value, Math.max(...sizes, asked || 0));
+      const x = value => chart.x(high > low ? (value - low) / (high - low) : 0.5);
+      const unit = study.units[study.variables.indexOf(axis.value)];
       const ends = high > low ? [[low, "left"], [(low + high) / 2, "center"], [high, "right"]] : [[low, "center"]];
       for (const [value, align] of ends) {
-        plane.text(`${numbers.fixed(Number(value.toPrecision(4)), placesOf(value))} ${unitAcross}`, [x(value), height - 10], "quiet", {align});
+        plane.text(`${numbers.fixed(Number(value.toPrecision(4)), placesOf(value))} ${unit}`, [x(value), chart.low], "quiet", {align});
       }
-      if (asked) plane.line([[STUDY_EDGE.left, y(asked / unit.si)], [width - STUDY_EDGE.right, y(asked / unit.si)]], "strong", 1.5, {dash: [6, 4]});
-      sizes.forEach((size, at) => {
-        if (at && size !== null) plane.dot([x(across[at]), y(size / unit.si)], 3, "before");
-      });
-      if (sizes[0] !== null) plane.dot([x(across[0]), y(sizes[0] / unit.si)], 6, "after", "strong");
+      if (asked) plane.line(chart.ends(asked), "strong", 1.5, {dash: [6, 4]});
+      const dot = (at, ...look) => {
+        if (sizes[at] !== null) plane.dot([x(across[at]), chart.y(sizes[at])], ...look);
+      };
+      for (let at = 1; at < sizes.length; at++) dot(at, 3, "before");
+      dot(0, 6, "after", "strong");
     }
 
     const placesOf = value => {

@@ -9,6 +9,7 @@ is there within milliseconds, with all of truepose imported already.
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 import threading
 import time
@@ -27,6 +28,9 @@ GRACE = 0.1
 PATIENCE = 0.2
 """s that the first answer may take though a newer question waits: numbers then follow a slider."""
 
+NICER = 5
+"""How much the process stands back behind the browser, which draws on the same computer."""
+
 WARM = ("truepose.studio.evaluation", "truepose.studio.rehearsal")
 """What a process that forks has imported."""
 
@@ -37,6 +41,8 @@ STOP = None
 def work(connection: Connection) -> None:
     """What the process does: answers jobs until nobody listens."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server
+    if hasattr(os, "nice"):
+        os.nice(NICER)
     try:
         while True:
             job: Job | None = connection.recv()

@@ -15,49 +15,67 @@ function element(name, attributes = {}, ...content) {
   return made;
 }
 
-// A slider of `get` and `set`, both SI. `low` and `high` are SI too, `marks` where ticks are.
-function slider({name, label, unit, low, high, get, set, marks = [], numbers}) {
-  const id = `live-${name.replace(/\W/g, "-")}`;
-  let [least, most] = [low, high].map(value => numbers.shown(value, unit));
-  const step = roundUp((most - least) / STEPS * 0.999);
-  const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  least = Math.floor(least / step + 1e-9) * step;
-  most = Math.ceil(most / step - 1e-9) * step;
+// A slider of `get` and `set`, both SI. `ends`: a function, `low` and `high` of it, SI too, and `marks`,
+// where ticks are.
+function slider({name, label, unit, ends, get, set, numbers}) {
+  const id = `live-${name.replace(/\W/g, "-")}`, ticks = element("datalist", {id: `${id}-marks`});
   const full = unit.label ? `${label}, ${unit.label}` : label;
-  const range = element("input", {
-    type: "range", id, "aria-label": full, min: least, max: most, step, ...(marks.length ? {list: `${id}-marks`} : {}),
-  });
+  const range = element("input", {type: "range", id, "aria-label": full});
   const number = element("input", {type: "number", step: "any", "aria-label": full});
-  const mark = marks.map(at => element("option", {value: numbers.shown(at, unit)}));
+  let least, most, decimals, fitted = "";
+  // Where the range was put, which moves nothing that stands there already: a browser lays it out anew.
+  let placed = NaN;
+  fit();
   const row = element(
     "div", {className: "live-slider"},
     element("label", {htmlFor: id}, label.replace(/[._]/g, "$&\u200b")), range, number,
     element("span", {className: "unit"}, unit.label),
-    ...(marks.length ? [element("datalist", {id: `${id}-marks`}, ...mark)] : []),
+    ...(ticks.childElementCount ? [ticks] : []),
   );
   row.dataset.of = name;
+
+  // As long as its ends are.
+  function fit() {
+    const {low, high, marks = []} = ends();
+    const told = String([low, high, marks]);
+    if (told === fitted) return;
+    [fitted, placed] = [told, NaN];
+    [least, most] = [low, high].map(value => numbers.shown(value, unit));
+    const step = roundUp((most - least) / STEPS * 0.999);
+    decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    least = Math.floor(least / step + 1e-9) * step;
+    most = Math.ceil(most / step - 1e-9) * step;
+    Object.assign(range, {min: least, max: most, step});
+    if (marks.length) range.setAttribute("list", ticks.id);
+    ticks.replaceChildren(...marks.map(at => element("option", {value: numbers.shown(at, unit)})));
+  }
+
   function show(besides) {
     const value = get(), shown = value === null ? null : numbers.shown(value, unit);
-    if (besides !== range) range.value = shown === null ? (least + most) / 2 : shown;
+    const place = shown === null ? (least + most) / 2 : shown;
+    if (besides !== range && place !== placed) range.value = placed = place;
     if (besides !== number) {
-      number.value = shown === null ? "" : Number(shown.toFixed(decimals + 1));
+      const text = shown === null ? "" : String(Number(shown.toFixed(decimals + 1)));
+      if (number.value !== text) number.value = text;
     }
-    range.setAttribute("aria-valuetext",
-      shown === null ? MISSING : `${numbers.fixed(shown, decimals)} ${unit.label}`);
+    const said = shown === null ? MISSING : `${numbers.fixed(shown, decimals)} ${unit.label}`;
+    if (range.getAttribute("aria-valuetext") !== said) range.setAttribute("aria-valuetext", said);
   }
   for (const input of [range, number]) {
     input.addEventListener("input", () => {
       const typed = input.valueAsNumber;
+      if (input === range) placed = NaN;
       if (Number.isFinite(typed)) set(numbers.meant(typed, unit), input);
     });
   }
   number.addEventListener("change", () => show());
-  return {row, show, range, low: numbers.meant(least, unit), high: numbers.meant(most, unit)};
+  return {row, show, fit, range, low: numbers.meant(least, unit), high: numbers.meant(most, unit)};
 }
 
-// All controls of a state; `changed` is called at every step of one.
+// All controls of a state; `changed` is called at every step of one. `bundle`: a function, that of the
+// machine, of which others than `rowsOf` says may change.
 function controlsOf({bundle, components, commanded, state, words, numbers, changed}) {
-  const {units, workspace} = bundle, file = bundle.condition;
+  const {units, workspace, parts} = bundle(), [, moment] = wrenchOf(bundle());
   const NUMBER = {label: "\u00d7", si: 1};
   const all = [];
   const ranges = [];
@@ -80,19 +98,15 @@ function controlsOf({bundle, components, commanded, state, words, numbers, chang
     const unit = numbers.ofPose(name);
     const room = span > 0 ? BEYOND * span : numbers.isLength(name) ? size / 2 : 0.2;
     ranges.push(add(pose, {
-      name: `pose.${name}`, label: name, unit, low: low - room, high: high + room,
-      marks: span > 0 ? [low, high] : [],
+      name: `pose.${name}`, label: name, unit,
+      ends: () => ({low: low - room, high: high + room, marks: span > 0 ? [low, high] : []}),
       get: () => state.pose[at], set: value => { state.pose[at] = value; },
     }));
   });
 
   const temperature = element("div");
-  const parts = bundle.parts;
   if (parts.length) {
-    const known = parts.map(({part}) => temperatureOf(file, part, bundle));
-    const reference = bundle.reference_temperature;
-    const [low, high] = [Math.min(reference, ...known) - 20, Math.max(reference, ...known) + 20];
-    const common = {unit: units.temperature, low, high, marks: [reference]};
+    const common = {unit: units.temperature, ends: () => temperatureEnds(bundle())};
     add(temperature, {
       ...common, name: "temperature", label: words.all_parts,
       get: () => {
@@ -118,14 +132,17 @@ function controlsOf({bundle, components, commanded, state, words, numbers, chang
   }
 
   const load = element("div");
-  const wrench = (host, index, name, label, unit, most) => add(host, {
-    name, label, unit, low: -most, high: most, marks: [0],
+  const wrench = (host, index, name, label, unit, mostOf) => add(host, {
+    name, label, unit, ends: () => {
+      const most = mostOf();
+      return {low: -most, high: most, marks: [0]};
+    },
     get: () => state.condition.wrench[index],
     set: value => { state.condition.wrench[index] = value; },
   });
-  const [force, moment] = [file.wrench.slice(0, 3), file.wrench.slice(3)];
-  const mostForce = roundUp(3 * Math.hypot(...force)) || 1000;
-  const mostMoment = roundUp(Math.max(3 * Math.hypot(...moment), 0.2 * size * mostForce));
+  const mostForce = () => roundUp(3 * Math.hypot(...wrenchOf(bundle())[0])) || 1000;
+  const mostMoment = () => roundUp(
+    Math.max(3 * Math.hypot(...wrenchOf(bundle())[1]), 0.2 * size * mostForce()));
   const turning = element("details", {open: moment.some(Boolean)},
     element("summary", {}, words.moment));
   WORLD.forEach((axis, at) => {
@@ -143,19 +160,18 @@ function controlsOf({bundle, components, commanded, state, words, numbers, chang
   if (turning.childElementCount > 1) load.append(turning);
 
   const tolerance = element("div");
-  const groups = [...new Set(bundle.variables.map(({group}) => group))];
-  for (const group of groups) {
+  for (const group of groupsOf(bundle())) {
     add(tolerance, {
       name: `tolerance.${group}`, label: group, unit: NUMBER,
-      low: 0, high: 3, marks: [1],
+      ends: () => ({low: 0, high: 3, marks: [1]}),
       get: () => state.scale.half_width[group],
       set: value => { state.scale.half_width[group] = Math.max(0, value); },
     });
   }
-  const {own, shared, limbs} = bundle.compliance;
-  if (own.length || shared.length || limbs) {
+  if (yields(bundle())) {
     add(tolerance, {
-      name: "stiffness", label: words.stiffness, unit: NUMBER, low: 0.1, high: 3, marks: [1],
+      name: "stiffness", label: words.stiffness, unit: NUMBER,
+      ends: () => ({low: 0.1, high: 3, marks: [1]}),
       get: () => 1 / state.scale.compliance,
       set: value => { state.scale.compliance = 1 / Math.max(0.01, value); },
     });
@@ -168,6 +184,26 @@ function controlsOf({bundle, components, commanded, state, words, numbers, chang
     ].filter(([, host]) => host.childElementCount),
     ranges,
     show: () => all.forEach(one => one.show()),
+    // Ends as they are in the condition of another machine of the same rows.
+    fit: () => all.forEach(one => one.fit()),
+  };
+}
+
+// Which controls there are, and how many: machines that have it in common have the same ones.
+function rowsOf(bundle) {
+  return JSON.stringify([bundle.parts, groupsOf(bundle), yields(bundle), wrenchOf(bundle)[1].some(Boolean)]);
+}
+
+const groupsOf = ({variables}) => [...new Set(variables.map(({group}) => group))];
+const yields = ({compliance: {own, shared, limbs}}) => Boolean(own.length || shared.length || limbs);
+// Force and moment of the file.
+const wrenchOf = ({condition: {wrench}}) => [wrench.slice(0, 3), wrench.slice(3)];
+
+function temperatureEnds(bundle) {
+  const {condition, parts, reference_temperature: reference} = bundle;
+  const known = parts.map(({part}) => temperatureOf(condition, part, bundle));
+  return {
+    low: Math.min(reference, ...known) - 20, high: Math.max(reference, ...known) + 20, marks: [reference],
   };
 }
 

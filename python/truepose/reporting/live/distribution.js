@@ -51,7 +51,7 @@ function distributionView(canvas, {numbers, words}) {
     }
   }
 
-  return {show, draw};
+  return {show, draw, anew() { most = 0; }};
 }
 
 // A column of what was read, its quantiles at PROBABILITIES.

@@ -9,16 +9,16 @@ const REST = 140;
 // `engine` has the kernel, here and in a worker. `moved` is told the state whenever somebody moves it,
 // and null when it is put back; `before` is what `end` gave of the part whose place this one takes.
 function livePart(place, setting, {ask, worker}, {moved = () => {}, before = null} = {}) {
-  const {bundle, drawing, words, scale: colours} = setting;
-  const {target} = bundle;
-  const sources = bundle.sources.map(source => ({...source, ...setting.sources[source.name]}));
-  const numbers = numbersOf({units: bundle.units, marks: setting.marks});
-  const made = ask({op: "machine", bundle});
-  const {machine, components, commanded} = made;
+  const {words, scale: colours, planar} = setting;
+  const {target, units, workspace} = setting.bundle;
+  const numbers = numbersOf({units, marks: setting.marks});
+  const made = ask({op: "machine", bundle: setting.bundle}), {components, commanded} = made;
   const quantities = quantitiesOf(components);
-  const notLive = sources.filter(source => !source.live);
-  const within = allWithin(bundle.variables);
+  const sources = sourcesOf(setting), form = formOf(setting);
   const find = name => place.querySelector(`[data-live="${name}"]`);
+  // What another machine of the same form has its own.
+  let {bundle, drawing} = setting, {machine} = made;
+  let notLive = sources.filter(source => !source.live), within = allWithin(bundle.variables);
 
   const state = asInTheFile(bundle);
   if (before) keepFactors(state, before.state);
@@ -30,24 +30,19 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
   // its tool is `moved`.
   let other = null;
 
-  const controls = controlsOf({
-    bundle, components, commanded, state, words, numbers, changed: () => changed(),
-  });
-  for (const [title, host] of controls.groups) {
-    const group = element("fieldset", {}, element("legend", {}, title), host);
-    find("controls").append(group);
-  }
+  let controls = null;
+  furnish();
   const cards = cardsOf(find("cards"), find("strip"), {
     states: {before: words.as_commanded, after: words.compensated}, quantities, target, words, numbers,
   });
   const table = sourcesTable(find("sources"), {components, quantities, sources, target, words, numbers});
   const view = machineView(find("machine"), {
-    drawing, planar: setting.planar, box: edgesOf(bundle.workspace, commanded),
+    drawing, planar, box: edgesOf(workspace, commanded),
     grouped: factor => numbers.fixed(factor, factor < 10 ? 1 : 0), before: before && before.view,
   });
   const limits = controls.ranges.slice(0, commanded.length).map(({low, high}) => [low, high]);
   const map = mapView(find("map"), {
-    scale: colours, ask, limits, pose: () => state.pose, workspace: bundle.workspace, numbers,
+    scale: colours, ask, limits, pose: () => state.pose, workspace, numbers,
     commanded, words, moved: () => { controls.show(); changed(); }, before: before && before.map,
   });
   const distribution = distributionView(find("distribution"), {numbers, words});
@@ -60,6 +55,15 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     told();
   };
   worker.onerror = event => { if (known) { known.failed = event.message; told(); } };
+
+  // Controls of the machine.
+  function furnish() {
+    controls = controlsOf({
+      bundle: () => bundle, components, commanded, state, words, numbers, changed: () => changed(),
+    });
+    find("controls").replaceChildren(...controls.groups.map(
+      ([title, host]) => element("fieldset", {}, element("legend", {}, title), host)));
+  }
 
   function changed() {
     moved(state);
@@ -155,8 +159,7 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
       cards.show(name, verdict, said(verdict, name), sizes, decides);
       shown[name] = fine && later.samples ? later.samples : null;
     }
-    view.add({ellipses: Object.fromEntries(Object.entries(shown).map(
-      ([name, read]) => [name, read && read.ellipse]))});
+    view.add(Object.fromEntries(Object.entries(shown).map(([name, read]) => [name, read && read.ellipse])));
     if (shown.before || shown.after || !known.errors.before) {
       distribution.show(shown, quantity, target[quantity]);
     }
@@ -238,12 +241,16 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
 
   find("scale").style.background = `linear-gradient(to right, ${colours.map(
     colour => `rgb(${colour.join(",")})`).join(",")})`;
-  find("not-live").replaceChildren(...notLive.map(source => {
-    const size = Object.entries(source.largest || {}).map(
-      ([name, value]) => numbers.error(value, name)).join(", ") || MISSING;
-    const said = filled(words.not_live, {source: source.name, why: source.why, size});
-    return element("li", {}, source.banded ? `${said} ${words.banded}` : said);
-  }));
+  function sayNotLive() {
+    find("not-live").replaceChildren(...notLive.map(source => {
+      const size = Object.entries(source.largest || {}).map(
+        ([name, value]) => numbers.error(value, name)).join(", ") || MISSING;
+      const said = filled(words.not_live, {source: source.name, why: source.why, size});
+      return element("li", {}, source.banded ? `${said} ${words.banded}` : said);
+    }));
+  }
+
+  sayNotLive();
   choices();
   controls.show();
   const size = new ResizeObserver(drawAll), dark = matchMedia("(prefers-color-scheme: dark)");
@@ -264,6 +271,34 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     update(false);
   }
 
+  // Another machine in place of this one, in what is there of the page; false where its form is another.
+  function exchange(next, shown) {
+    if (formOf(next) !== form) return false;
+    const anew = ask({op: "machine", bundle: next.bundle});
+    if (String([anew.components, anew.commanded]) !== String([components, commanded])) {
+      ask({op: "free", machine: anew.machine});
+      return false;
+    }
+    ask({op: "free", machine});
+    const same = rowsOf(next.bundle) === rowsOf(bundle);
+    ({bundle, drawing} = next);
+    ({machine} = anew);
+    notLive = sourcesOf(next).filter(source => !source.live);
+    within = allWithin(bundle.variables);
+    known = other = null;
+    const {scale} = state;
+    Object.assign(state, asInTheFile(bundle));
+    keepFactors(state, {scale});
+    if (same) controls.fit();
+    else furnish();
+    sayNotLive();
+    view.of(drawing);
+    distribution.anew();
+    worker.postMessage({bundle});
+    show(shown, true);
+    return true;
+  }
+
   // Nothing of it runs any more; what the next part, of another machine, is to look like.
   function end() {
     clearTimeout(rest);
@@ -274,5 +309,13 @@ function livePart(place, setting, {ask, worker}, {moved = () => {}, before = nul
     return {state, quantity, job, view: view.kept(), map: map.kept()};
   }
 
-  return {update, show, overlay, end, numbers, get state() { return state; }};
+  return {update, show, overlay, exchange, end, numbers, get state() { return state; }};
+}
+
+const sourcesOf = ({bundle, sources}) => bundle.sources.map(source => ({...source, ...sources[source.name]}));
+
+// What a page's body is made of: machines that have it in common differ in numbers and controls alone.
+function formOf({bundle, planar, sources}) {
+  const {units, workspace, target, sources: own} = bundle;
+  return JSON.stringify([planar, units, workspace, target, sources, own.map(({name, live}) => [name, live])]);
 }

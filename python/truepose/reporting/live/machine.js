@@ -11,10 +11,16 @@ const SHOWN_LEAST = 0.05, SHOWN_BEST = 0.22, SHOWN_MOST = 0.5;
 function machineView(canvas, {drawing, planar, box, grouped, before}) {
   const plane = canvasOf(canvas);
   const {turn, magnification: magnified} = before || {turn: {...TURN}, magnification: null};
-  let shown = null, magnification = magnified;
-  const {middle, radius, wide, high} = extentOf([
-    ...drawing.paths.flat(), ...drawing.frame, ...drawing.points, ...box.flat(),
-  ]);
+  let shown = null, magnification = magnified, middle, radius, wide, high;
+  of(drawing);
+
+  // What is drawn of a machine is as large as the canvas has room for it.
+  function of(another) {
+    drawing = another;
+    ({middle, radius, wide, high} = extentOf([
+      ...drawing.paths.flat(), ...drawing.frame, ...drawing.points, ...box.flat(),
+    ]));
+  }
 
   // A function: a point in space -> where it is on the canvas.
   function projection(width, height) {
@@ -131,7 +137,7 @@ function machineView(canvas, {drawing, planar, box, grouped, before}) {
   }
 
   return {
-    draw,
+    draw, of,
     kept: () => ({turn, magnification}),
     // `largest`: the longest error that is to be seen, m; returns how many times it is magnified.
     show(picture, largest) {
@@ -140,8 +146,10 @@ function machineView(canvas, {drawing, planar, box, grouped, before}) {
       draw();
       return grouped(factor);
     },
-    add(more) {
-      if (shown) Object.assign(shown, more);
+    // Ellipses of the states, null where there is none; nothing is drawn anew for what is there.
+    add(ellipses) {
+      if (!shown || Object.entries(ellipses).every(([name, one]) => (shown.ellipses[name] ?? null) === one)) return;
+      shown.ellipses = ellipses;
       draw();
     },
   };

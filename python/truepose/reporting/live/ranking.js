@@ -49,7 +49,8 @@ function sourcesTable(host, {components, quantities, sources, target, words, num
     const decimals = name => digits[name];
     const size = name => reaches[name] ? reaches[name][quantities[0]] : -1;
     const order = live.map(({name}) => name).sort((a, b) => size(b) - size(a));
-    body.replaceChildren(...order.map(name => rows[name].row), ...Object.values(all).map(one => one.row));
+    const wanted = [...order.map(name => rows[name]), ...Object.values(all)].map(({row}) => row);
+    if (wanted.some((row, at) => body.children[at] !== row)) body.replaceChildren(...wanted);
     for (const name of order) fill(rows[name], bySource[name], reaches[name], decimals);
     for (const name in all) fill(all[name], errors[name], reaches[name], decimals);
   }

@@ -28,14 +28,19 @@ function changingPart(place, setting, engine, moved) {
     // What is being dragged must not go away under the pointer.
     if (held) { waiting = [machine, shown]; return; }
     const begun = performance.now();
-    const before = part && part.end();
     const focus = part && placeOfFocus(body()), open = part && openDetails(body()).map(one => one.open);
-    if (part) body().replaceWith(blank.cloneNode(true));
-    part = livePart(place, {...setting, ...machine}, engine, {moved, before});
+    if (!part || !part.exchange(machine, shown)) begin(machine, shown);
     if (open) openDetails(body()).forEach((one, at) => { one.open = open[at] ?? one.open; });
-    part.show(shown, true);
     if (focus) focusAgain(body(), focus);
     place.dataset.taken = performance.now() - begun;
+  }
+
+  // A part of a machine of another form takes a body of its own.
+  function begin(machine, shown) {
+    const before = part && part.end();
+    if (part) body().replaceWith(blank.cloneNode(true));
+    part = livePart(place, {...setting, ...machine}, engine, {moved, before});
+    part.show(shown, true);
   }
 
   place.addEventListener("pointerdown", event => { held = body().contains(event.target); });

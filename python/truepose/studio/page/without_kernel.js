@@ -10,7 +10,7 @@ function controlsAlone(host, setting, {names, moved}) {
     const numbers = numbersOf({units: bundle.units, marks: setting.marks});
     state = shownOf(bundle, shown);
     controls = controlsOf({
-      bundle, components, commanded, state, words: setting.words, numbers,
+      bundle: () => bundle, components, commanded, state, words: setting.words, numbers,
       changed: () => moved(state),
     });
     const {pose, temperature, load} = setting.words, kept = [pose, temperature, load];

@@ -1,7 +1,7 @@
 // The witness of the verdict, one machine inside the bands, drawn at its pose over the nominal one, in
 // place of what is known.
 
-// `part`: a function, the live part; its body is another one after every change of the machine.
+// `part`: a function, the live part; its body is another one where the machine's form is.
 function witnessDrawing(place, {words, said, tell, part, go}) {
   const states = {before: words.as_commanded, after: words.compensated};
   const find = name => place.querySelector(`[data-live="${name}"]`);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -83,6 +84,13 @@ if TYPE_CHECKING:
         "with one that is not finished.",
     ),
     click.option(
+        "--report",
+        "report_file",
+        metavar="FILE.html",
+        type=OutputFile(".html"),
+        help="Write a page with figures too: response curves, variants side by side, Pareto front.",
+    ),
+    click.option(
         "--dry-run",
         is_flag=True,
         help="Say how many variants there are, how long they take (measured on a few) and how "
@@ -98,6 +106,7 @@ def command(
     quantities: str | None,
     reach: str,
     dry_run: bool,
+    report_file: Path | None,
     **options: Any,
 ) -> int:
     """Evaluate many variants of a machine file.
@@ -122,6 +131,7 @@ def command(
         )
     if output is not None:
         studies.require_store(output)
+    page = None if report_file is None else _page(report_file, request.machine_file, dry_run)
     names = QUICK_NAMES if quantities is None else [one.strip() for one in quantities.split(",")]
     with waiting("machine file, and values tried on it"):
         prepared = studies.prepare(
@@ -164,7 +174,21 @@ def command(
         return INTERRUPTED
     _show(prepared, result, request.format)
     note_written(output)
+    if page is not None and report_file is not None:
+        page.write(prepared.machine, result, report_file)
+        note_written(report_file)
     return 0
+
+
+def _page(path: Path, machine_file: Path, dry_run: bool) -> Any:
+    """The module that writes the page, before any work."""
+    from truepose.files.writing import require_writable
+    from truepose.reporting.drawing_packages import module_that_draws
+
+    if dry_run:
+        raise click.UsageError("--dry-run writes nothing: leave out --report")
+    require_writable(path, (".html",), [machine_file])
+    return module_that_draws("truepose.reporting.variants_page")
 
 
 def _show(prepared: PreparedStudy, result: xr.Dataset, form: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truepose.arrays import Indices
+from truepose.arrays import Flags, Floats, Indices
 from truepose.studies.block import FAILED, INFEASIBLE, OK
 
 if TYPE_CHECKING:
@@ -36,6 +36,24 @@ def ranked(dataset: xr.Dataset) -> Indices:
     return fine.astype(np.intp)
 
 
+def pareto(sizes: Floats) -> Flags:
+    """(n,) which of n variants none other beats: is as small in every size (n, k), smaller in one.
+
+    Of equal variants all are on the front, or none.
+    """
+    order = np.lexsort(sizes.T[::-1])
+    on_front = np.zeros(len(sizes), np.bool_)
+    front = np.empty((0, sizes.shape[1]))
+    # Whoever beats a variant comes before it in this order, and so does one of the front that does.
+    for number in order.tolist():
+        own = sizes[number]
+        beaten = (front <= own).all(axis=1) & (front < own).any(axis=1)
+        if not beaten.any():
+            on_front[number] = True
+            front = np.vstack([front, own])
+    return on_front
+
+
 def causes(dataset: xr.Dataset) -> list[WhyNotOk]:
     """Each cause of variants that are not ok, the most frequent first."""
     status, codes = dataset["status"].values, dataset["code"].values
@@ -47,4 +65,4 @@ def causes(dataset: xr.Dataset) -> list[WhyNotOk]:
     return [WhyNotOk(word, len(of), of[0], str(reasons[of[0]])) for (word, _), of in rows]
 
 
-__all__ = ["WhyNotOk", "causes", "ranked"]
+__all__ = ["WhyNotOk", "causes", "pareto", "ranked"]

@@ -55,6 +55,20 @@ def test_the_table_has_the_best_variants_and_why_others_are_none(
     assert any(line.startswith("infeasible 2 0 ") and "25 poses lost" in line for line in lines)
 
 
+def test_a_page_is_written_beside_the_store(store: Path, capsys: Capture) -> None:
+    page = store.with_suffix(".html")
+    outcome = call(capsys, *STUDY, "--output", store, "--report", page)
+    assert (outcome.code, outcome.err) == (0, f"wrote {store}\nwrote {page}\n")
+    assert "How the error goes with each variable" in page.read_text("utf-8")
+
+
+def test_a_dry_run_writes_no_page(store: Path, capsys: Capture) -> None:
+    outcome = call(capsys, *STUDY, "--dry-run", "--report", store.with_suffix(".html"))
+    assert outcome.code == 2
+    assert "leave out --report" in outcome.err
+    assert not store.with_suffix(".html").exists()
+
+
 def test_the_same_command_says_that_it_goes_on(store: Path, capsys: Capture) -> None:
     first = call(capsys, *STUDY, "--output", store)
     again = call(capsys, *STUDY, "--output", store)

@@ -85,8 +85,8 @@ class Asked(TypedDict):
         type=int,
         default=0,
         show_default=True,
-        help="Other designs that are told with their costs: of other options, or another grade "
-        "of what is tied.",
+        help="Other designs that are told with their costs: of other options, or without one "
+        "of the grades of what is tied.",
     ),
     click.option(
         "--region",

@@ -53,7 +53,7 @@ def allocate(
     the file asks the accuracy of a share of all machines. `statistical`: such a share, 0.95, by
     default that of the file: so many machines are within the targets, at each pose by itself or,
     with `all_poses`, at all of them. `alternatives`: so many other designs with what they cost,
-    which differ in an option or in the grade of a tie of several tolerances, for the worst case.
+    of other options, or without one of the grades of what is tied, for the worst case.
     `region`: prove the design all over the box too, before compensation, if that can be.
     `progress` is called with (programmes solved, 0). Ctrl-C gives the best design and the bound of
     then.

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.arrays import Floats
+from truepose.arrays import Floats, Indices
 from truepose.design.judge import Effort, Findings, Judge, WorstPlace
 from truepose.design.programme import Programme, ProgrammeSolution
 from truepose.design.space import Combination, DesignSpace
@@ -31,6 +31,8 @@ _ALIKE = 1e-4
 """By which share a design with one grade for all, told for comparison, may be beyond a limit."""
 
 _HALVINGS = 20
+
+_NONE: Indices = np.empty(0, np.intp)
 
 _MOST_PLAINER = 20
 """Rounds of cuts for a design of fewer distinct grades."""
@@ -81,7 +83,7 @@ class OptionCombination:
         self.bound = self.option_cost
         self.duals: dict[tuple[object, ...], float] = {}
         self._too_coarse: list[Floats] = []
-        self._forbidden: tuple[int, ...] = ()
+        self._forbidden = _NONE
         self._programme = Programme(space.cost, space.tie_of)
         self._tick = tick
 
@@ -166,21 +168,21 @@ class OptionCombination:
         if any(math.isinf(witness.exact) for witness in witnesses):
             self._too_coarse.append(self.space.chosen(design.grades))
 
-    def without(self, column: int, gap: float) -> GradedDesign | None:
-        """The design within `gap` of the cheapest that does not have a column."""
-        self._forbidden = (column,)
+    def without(self, columns: Indices, gap: float) -> GradedDesign | None:
+        """The design within `gap` of the cheapest that has none of some columns."""
+        self._forbidden = columns
         try:
             return self.cheapest(gap, None)
         finally:
-            self._forbidden = ()
+            self._forbidden = _NONE
 
-    def estimate_without(self, column: int) -> float:
-        """What the relaxation of the cuts costs that does not have a column."""
-        self._forbidden = (column,)
+    def estimate_without(self, columns: Indices) -> float:
+        """What the relaxation of the cuts costs that has none of some columns."""
+        self._forbidden = columns
         try:
             solution = self._programme.relaxed(*self._rows(exact=True))
         finally:
-            self._forbidden = ()
+            self._forbidden = _NONE
         return math.inf if solution is None else self.option_cost + solution.cost
 
     def plainest(self, known: GradedDesign, budget: float) -> GradedDesign | None:
@@ -321,9 +323,9 @@ class OptionCombination:
             finer = np.array([self._as_coarse(x) for x in self._too_coarse])
             coefficients = np.concatenate([coefficients, finer])
             most = np.concatenate([most, np.full(len(finer), len(self.space.ties) - 1.0)])
-        for column in self._forbidden:
+        if self._forbidden.size:
             row = np.zeros((1, self.space.cost.size))
-            row[0, column] = 1.0
+            row[0, self._forbidden] = 1.0
             coefficients = np.concatenate([coefficients, row])
             most = np.append(most, 0.0)
         return coefficients, most

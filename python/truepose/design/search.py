@@ -196,10 +196,10 @@ class DesignSearch:
         candidate.judge.forget()
 
     def _confirmed(
-        self, candidate: OptionCombination, found: Callable[[], GradedDesign | None]
+        self, candidate: OptionCombination, next_design: Callable[[], GradedDesign | None]
     ) -> GradedDesign | None:
-        """What is `found` and nothing is found beyond its limits; each time that is, it is cut."""
-        while (design := found()) is not None:
+        """The first `next_design` that nothing is found beyond the limits of; others are cut off."""
+        while (design := next_design()) is not None:
             beyond = [witness for witness in self._confirm(candidate, design) if witness.exceeds]
             if not beyond:
                 return design
@@ -219,41 +219,42 @@ class DesignSearch:
         candidate.judge.forget()
 
     def _alternatives(self, possible: Sequence[OptionCombination]) -> None:
-        """The cheapest designs with other options, or another grade of what is tied."""
+        """The cheapest designs with other options, or without one of the grades of what is tied."""
         outcome, best, own = self.outcome, self.outcome.best, self.outcome.candidate
         if not self.task.alternatives or best is None or own is None:
             return
-        asked: list[tuple[float, OptionCombination, int | None]] = [
+        asked: list[tuple[float, OptionCombination, Indices | None]] = [
             (candidate.bound, candidate, None) for candidate in possible if candidate is not own
         ]
-        columns = self.space.columns(best.grades).tolist()
-        asked += [
-            (own.estimate_without(column), own, column)
-            for tie, column in zip(self.space.ties, columns, strict=True)
-            if len(tie.features) > 1
-        ]
-        found: list[GradedDesign] = []
-        for estimate, candidate, column in sorted(asked, key=lambda one: one[0]):
-            if len(found) == self.task.alternatives and estimate >= found[-1].cost:
+        # Without a grade for any tie of its row: to exchange two joints' grades is no other design.
+        tied = {tie.row for tie in self.space.ties if len(tie.features) > 1}
+        used = self.space.kind_of[self.space.columns(best.grades)]
+        for row, kind in sorted({*zip((tie.row for tie in self.space.ties), used, strict=True)}):
+            if row in tied:
+                columns = np.flatnonzero(self.space.kind_of == kind)
+                asked.append((own.estimate_without(columns), own, columns))
+        others: list[GradedDesign] = []
+        for estimate, candidate, barred in sorted(asked, key=lambda one: one[0]):
+            if len(others) == self.task.alternatives and estimate >= others[-1].cost:
                 break
             if math.isinf(estimate):
                 break
-            design = self._confirmed(candidate, self._other(candidate, column))
+            design = self._confirmed(candidate, self._other(candidate, barred))
             candidate.judge.forget()
-            known = {(one.combination, one.grades) for one in (best, *found)}
+            known = {(one.combination, one.grades) for one in (best, *others)}
             if design is not None and (design.combination, design.grades) not in known:
-                found = sorted([*found, design], key=lambda one: one.cost)
-                found = found[: self.task.alternatives]
-        outcome.alternatives = tuple(found)
+                others = sorted([*others, design], key=lambda one: one.cost)
+                others = others[: self.task.alternatives]
+        outcome.alternatives = tuple(others)
 
     def _other(
-        self, candidate: OptionCombination, column: int | None
+        self, candidate: OptionCombination, barred: Indices | None
     ) -> Callable[[], GradedDesign | None]:
-        """How a design is found of other options, or without a column."""
+        """How a design is found of other options, or without some columns."""
         gap = self.task.gap
-        if column is None:
+        if barred is None:
             return lambda: candidate.cheapest(gap, None)
-        return lambda: candidate.without(column, gap)
+        return lambda: candidate.without(barred, gap)
 
     def _alike(self, possible: Sequence[OptionCombination], *, between: bool) -> float:
         """What one grade for all costs, with the options for which that is least."""

@@ -147,27 +147,27 @@ class StatisticalJudge:
 
         `fresh` (n, d): poses to look at besides, this once.
         """
-        found: list[QuantilePlace] = []
+        worst_places: list[QuantilePlace] = []
         every = [self._poses, np.array(self._further).reshape(-1, self._poses.shape[1])]
         poses = np.concatenate([*every, *([] if fresh is None else [fresh])])
         self.left_out = 0
         for case, condition in enumerate(self.conditions):
             machines = DrawnMachines(machine, condition, self.state)
-            found += self._in_case(machines, case, poses, level, sampling)
-        found.sort(key=lambda place: -place.share)
-        self.look_at([place.pose for place in found])
-        return found
+            worst_places += self._in_case(machines, case, poses, level, sampling)
+        worst_places.sort(key=lambda place: -place.share)
+        self.look_at([place.pose for place in worst_places])
+        return worst_places
 
     def at_poses(
         self, machine: Machine, level: float, wanted: Sequence[tuple[int, Floats]], draws: int
     ) -> list[QuantilePlace]:
         """The places of all quantities at (case, pose), each once."""
-        found: list[QuantilePlace] = []
+        worst_places: list[QuantilePlace] = []
         for case, condition in enumerate(self.conditions):
             poses = [pose for number, pose in wanted if number == case]
             machines = DrawnMachines(machine, condition, self.state)
-            found += self._sampled(machines, case, np.array(poses), level, draws, 0)
-        return sorted(found, key=lambda place: -place.share)
+            worst_places += self._sampled(machines, case, np.array(poses), level, draws, 0)
+        return sorted(worst_places, key=lambda place: -place.share)
 
     # --- inside
 
@@ -240,20 +240,20 @@ class StatisticalJudge:
         draws: int,
         seed: int,
     ) -> list[QuantilePlace]:
-        found: list[QuantilePlace] = []
+        worst_places: list[QuantilePlace] = []
         if not len(poses):
-            return found
+            return worst_places
         for number, errors in machines.exact(poses, draws, seed):
             for quantity, (columns, target) in enumerate(
                 zip(machines.kinds, self.targets, strict=True)
             ):
                 if target is not None:
-                    found.append(
+                    worst_places.append(
                         self._place(
                             case, quantity, poses[number], errors[:, columns], target, level
                         )
                     )
-        return found
+        return worst_places
 
     def _place(
         self, case: int, quantity: int, pose: Floats, errors: Floats, target: float, level: float

@@ -183,7 +183,7 @@ class StatisticalCombination:
 
     def variances_of(self, place: QuantilePlace, halves: Floats) -> Floats:
         """(f,) what each feature adds to <G, C> at a place, with half widths (f,)."""
-        moved = self._slopes(place) * halves
+        moved = self._slopes([place])[0] * halves
         together = moved @ self.bands.member @ np.diag(self._variance) @ self.bands.member.T
         return np.asarray(np.einsum("kf,kl,lf->f", moved, place.weight, together))
 
@@ -244,25 +244,25 @@ class StatisticalCombination:
 
     def _cut(self, places: Sequence[QuantilePlace], x: Floats) -> None:
         """Take the laws of places, of the design of columns x."""
-        for place in places:
-            if math.isfinite(place.size):
-                self._cuts[place.key] = self._law(place, x)
+        told = [place for place in places if math.isfinite(place.size)]
+        for place, slopes in zip(told, self._slopes(told), strict=True):
+            self._cuts[place.key] = self._law(place, slopes, x)
 
-    def _law(self, place: QuantilePlace, x: Floats) -> _Cut:
+    def _law(self, place: QuantilePlace, slopes: Floats, x: Floats) -> _Cut:
         now = float((place.weight * place.covariance).sum())
         if now <= 0.0:  # nothing spreads
             return _Cut(place, np.zeros(x.size), -1.0 if place.exceeds else 1.0)
         # v <= allowed, of which the columns add as much as they do now to what others do.
-        own = self._variances(place)
+        own = self._variances(place, slopes)
         allowed = max(place.limit - place.size + now, 0.0) ** 2 / now
         scale = max(now, allowed)
         return _Cut(place, own / scale, (allowed - now + float(own @ x)) / scale)
 
-    def _variances(self, place: QuantilePlace) -> Floats:
+    def _variances(self, place: QuantilePlace, slopes: Floats) -> Floats:
         """(x,) what each column adds to <G, C> at a place."""
         moved = np.einsum(
             "kf,xf,fv->xkv",
-            self._slopes(place),
+            slopes,
             self.space.halves,
             self.bands.member,
             optimize=True,
@@ -270,11 +270,17 @@ class StatisticalCombination:
         weighed = np.einsum("xkv,kl,xlv->xv", moved, place.weight, moved, optimize=True)
         return np.asarray(weighed @ self._variance)
 
-    def _slopes(self, place: QuantilePlace) -> Floats:
-        """(k, f) what a unit of each feature's half width does at a place."""
-        model = self.models[place.case]
-        errors = model.at(place.pose[np.newaxis])
-        return np.asarray(errors.slopes[0][model.kinds[place.quantity]])
+    def _slopes(self, places: Sequence[QuantilePlace]) -> list[Floats]:
+        """(k, f) what a unit of each feature's half width does, at each of some places."""
+        slopes = [np.empty(0)] * len(places)
+        for case, model in enumerate(self.models):
+            numbers = [at for at, place in enumerate(places) if place.case == case]
+            if not numbers:
+                continue
+            errors = model.at(np.array([places[at].pose for at in numbers]))
+            for at, of_pose in zip(numbers, errors.slopes, strict=True):
+                slopes[at] = of_pose[model.kinds[places[at].quantity]]
+        return slopes
 
     def _rows(self) -> tuple[Floats, Floats]:
         count = self.space.cost.size
@@ -366,10 +372,10 @@ class StatisticalSearch:
     def _confirmed(self, candidate: StatisticalCombination) -> GradedDesign | None:
         """The cheapest design of a combination of which fresh machines show the share."""
         for _ in range(_CHECKS):
-            found = candidate.cheapest(self.task.gap)
-            if found is None:
+            cheapest = candidate.cheapest(self.task.gap)
+            if cheapest is None:
                 return None
-            design, places = found
+            design, places = cheapest
             kept, beyond = self._fresh(candidate, design, places)
             if not beyond:
                 self._better(candidate, design, kept, places)
@@ -386,10 +392,10 @@ class StatisticalSearch:
         level, design = 1.0 - 0.5 * (1.0 - share), None
         for _ in range(_LEVELS):
             candidate.at_level(level, design)
-            found = candidate.cheapest(self.task.gap)
-            if found is None:
+            cheapest = candidate.cheapest(self.task.gap)
+            if cheapest is None:
                 return
-            design, places = found
+            design, places = cheapest
             kept, _ = self._fresh(candidate, design, places)
             sure = kept.all_poses - STANDARD_ERRORS * kept.all_poses_error
             short = wanted - float(normal_quantile(np.clip(np.array(sure), 1e-6, 1.0 - 1e-6)))
@@ -414,14 +420,14 @@ class StatisticalSearch:
         poses = _fresh_poses(judge.places, self._seed)
         machine = candidate.bands.designed(candidate.halves(design.grades))
         sampling = Sampling(CLIMB.starts, 6, FINAL_DRAWS, self._seed)
-        found = judge.assess(machine, candidate.level, sampling, poses)
+        seen = judge.assess(machine, candidate.level, sampling, poses)
         beyond = [
             dataclasses.replace(one, size=max(one.size, one.limit * (1.0 + 1e-4)))
-            for one in found
+            for one in seen
             if one.within - STANDARD_ERRORS * one.standard_error < candidate.level
         ]
-        worst = min(found, key=lambda one: one.within)
-        looked = np.concatenate([poses, [one.pose for one in (*found, *places)]])
+        worst = min(seen, key=lambda one: one.within)
+        looked = np.concatenate([poses, [one.pose for one in (*seen, *places)]])
         kept = shares_kept(
             machine,
             list(task.conditions.values()),

@@ -210,7 +210,7 @@ def _shares(result: Allocation) -> Iterator[str]:
     kept = result.kept
     if kept is None:
         return
-    each, every = (
+    at_one, at_all = (
         f"{100.0 * share:.2f} % (standard error {100.0 * error:.2f} %)"
         for share, error in (
             (kept.each_pose, kept.each_pose_error),
@@ -219,8 +219,8 @@ def _shares(result: Allocation) -> Iterator[str]:
     )
     asked = "at all poses" if result.all_poses else "at each pose"
     yield (
-        f"Of machines drawn anew {each} are within the targets at the worst pose, {every} at all "
-        f"of {counted(kept.poses, 'pose')} at once; asked were {100.0 * (result.share or 0.0):g} % "
+        f"Of machines drawn anew {at_one} are within the targets at the worst pose, {at_all} at "
+        f"all of {counted(kept.poses, 'pose')} at once; asked were {100.0 * (result.share or 0.0):g} % "
         f"{asked}."
     )
 

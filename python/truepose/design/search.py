@@ -198,7 +198,7 @@ class DesignSearch:
     def _confirmed(
         self, candidate: OptionCombination, next_design: Callable[[], GradedDesign | None]
     ) -> GradedDesign | None:
-        """The first `next_design` that nothing is found beyond the limits of; others are cut off."""
+        """The first `next_design` that is found to keep its limits; the others are cut off."""
         while (design := next_design()) is not None:
             beyond = [witness for witness in self._confirm(candidate, design) if witness.exceeds]
             if not beyond:

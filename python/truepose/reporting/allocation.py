@@ -220,8 +220,8 @@ def _shares(result: Allocation) -> Iterator[str]:
     asked = "at all poses" if result.all_poses else "at each pose"
     yield (
         f"Of machines drawn anew {at_one} are within the targets at the worst pose, {at_all} at "
-        f"all of {counted(kept.poses, 'pose')} at once; asked were {100.0 * (result.share or 0.0):g} % "
-        f"{asked}."
+        f"all of {counted(kept.poses, 'pose')} at once; asked were "
+        f"{100.0 * (result.share or 0.0):g} % {asked}."
     )
 
 

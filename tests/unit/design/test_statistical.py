@@ -184,3 +184,21 @@ def test_the_same_twice(tmp_path: Path) -> None:
         for _ in range(2)
     }
     assert len(texts) == 1
+
+
+def test_csv_has_a_row_for_each_tolerance_or_target(file: Path, capsys: Capture) -> None:
+    settings = ("--set", f"accuracy.target={TARGET}", "--statistical", "95 %")
+    done = call(capsys, "allocate", file, *settings, "--format", "csv")
+    assert done.code == 0
+    lines = done.out.splitlines()
+    assert lines[0] == "feature,half,unit,tie,grade,tie_of"
+    assert len(lines) == 5
+    cells = lines[1].split(",")
+    assert cells[0] == cells[3] == "strut.1.length"
+    assert cells[2] == "mm"
+    assert float(cells[1]) == pytest.approx(1e-3 * float(cells[4].split()[0]))
+    assert "of machines drawn anew" in done.err.lower()
+    curve = call(capsys, "allocate", file, "--curve", "0.2 mm:0.42 mm:2", "--format", "csv")
+    first, second = curve.out.splitlines()[1:]
+    assert first.startswith("0.2,,")
+    assert float(second.split(",")[1]) >= float(second.split(",")[2])

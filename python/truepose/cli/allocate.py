@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import click
 
@@ -27,6 +27,17 @@ MOST_TARGETS = 1000
 """Of a curve."""
 
 
+class Asked(TypedDict):
+    """What `truepose.allocate` and its curve are asked alike."""
+
+    state: str
+    worst: bool
+    statistical: float | None
+    all_poses: bool
+    reserve: float
+    gap: float
+
+
 @click.command("allocate")
 @takes(
     machine_argument,
@@ -44,6 +55,17 @@ MOST_TARGETS = 1000
         "of a share of them.",
     ),
     click.option(
+        "--statistical",
+        metavar="PERCENT",
+        help="Choose so that this share of all machines is within the target at each pose, such "
+        "as 95.  [default: the file's accuracy.at, else --worst]",
+    ),
+    click.option(
+        "--all-poses",
+        is_flag=True,
+        help="With a share of all machines: at all poses at once, which asks more.",
+    ),
+    click.option(
         "--reserve",
         metavar="SHARE",
         default="1 %",
@@ -56,6 +78,21 @@ MOST_TARGETS = 1000
         default="1 %",
         show_default=True,
         help="By which share of its cost the design may be dearer than the cheapest.",
+    ),
+    click.option(
+        "--alternatives",
+        metavar="N",
+        type=int,
+        default=0,
+        show_default=True,
+        help="Other designs that are told with their costs: of other options, or without one "
+        "of the grades of what is tied.",
+    ),
+    click.option(
+        "--region",
+        is_flag=True,
+        help="Prove the design at every pose of the box too, not at the worst ones alone; this "
+        "may take minutes.",
     ),
     click.option(
         "--curve",
@@ -75,13 +112,13 @@ MOST_TARGETS = 1000
     click.option(
         "--format",
         "format",
-        type=click.Choice(["table", "json"]),
+        type=click.Choice(["table", "json", "csv"]),
         default="table",
         show_default=True,
         callback=_note_format,
         is_eager=True,
-        help="What is printed: tables for people, or json for programs (full precision, in the "
-        "units of the machine file).",
+        help="What is printed: tables for people, json or csv for programs (full precision, in "
+        "the units of the machine file).",
     ),
     verbose_option,
 )
@@ -89,8 +126,12 @@ def command(
     *,
     before: bool,
     worst: bool,
+    statistical: str | None,
+    all_poses: bool,
     reserve: str,
     gap: str,
+    alternatives: int,
+    region: bool,
     curve: str | None,
     output: Path | None,
     **options: Any,
@@ -113,19 +154,21 @@ def command(
     if output is not None:
         require_writable(output, [ENDING], [request.machine_file])
     machine = _steps.load_machine(request.machine_file, request.settings)
-    shares = _share("--reserve", reserve), _share("--gap", gap)
+    asked: Asked = {
+        "state": BEFORE if before else AFTER,
+        "worst": worst,
+        "statistical": None if statistical is None else _percent(statistical),
+        "all_poses": all_poses,
+        "reserve": _share("--reserve", reserve),
+        "gap": _share("--gap", gap),
+    }
     if curve is not None:
         if output is not None:
             raise click.UsageError("--curve has several designs: it goes without --output.")
-        return _curve(request, machine, curve, shares, before=before, worst=worst)
+        return _curve(request, machine, curve, asked)
     with progress("allocation", "programmes", first="a design of the finest grades") as report:
         allocation = truepose.allocate(
-            machine,
-            state=BEFORE if before else AFTER,
-            worst=worst,
-            reserve=shares[0],
-            gap=shares[1],
-            progress=report,
+            machine, **asked, alternatives=alternatives, region=region, progress=report
         )
     if allocation.interrupted:
         click.echo(words.interrupted(allocation), err=True)
@@ -147,34 +190,17 @@ def command(
     return INTERRUPTED if allocation.interrupted else 0
 
 
-def _curve(
-    request: Request,
-    machine: Machine,
-    text: str,
-    shares: tuple[float, float],
-    *,
-    before: bool,
-    worst: bool,
-) -> int:
+def _curve(request: Request, machine: Machine, text: str, asked: Asked) -> int:
     """Costs against targets -> exit code."""
     from truepose.cli import _steps
     from truepose.cli._progress import progress
     from truepose.design.cost_curve import cost_curve
     from truepose.reporting import allocation as words
     from truepose.reporting.result import Result
-    from truepose.verdict.answer import AFTER, BEFORE
 
     targets = _targets(machine, text)
     with progress("cost curve", "targets", first="the widest target") as report:
-        curve = cost_curve(
-            machine,
-            targets,
-            state=BEFORE if before else AFTER,
-            worst=worst,
-            reserve=shares[0],
-            gap=shares[1],
-            progress=report,
-        )
+        curve = cost_curve(machine, targets, **asked, progress=report)
     if curve.interrupted:
         click.echo(f"Interrupted after {len(curve.points)} of {len(targets)} targets.", err=True)
     _steps.deliver(request, Result("allocate", machine, curve.dataset), [words.curve(curve)])
@@ -205,6 +231,15 @@ def _targets(machine: Machine, text: str) -> list[float]:
             expected=f'"0.1 mm:0.2 mm:5": two targets above zero, and 1 to {MOST_TARGETS} of them',
         )
     )
+
+
+def _percent(text: str) -> float:
+    """A share of all machines: "95", "95 %" and "0.95" are the same."""
+    try:
+        number = float(text)
+    except ValueError:
+        return _share("--statistical", text)
+    return number / 100.0 if number > 1.0 else number
 
 
 def _share(option: str, text: str) -> float:

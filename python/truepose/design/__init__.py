@@ -6,4 +6,8 @@ half widths (`error_model`): a cut. An integer programme of cuts (`programme`) g
 design that they allow, a judge (`judge`) looks where that design errs most, by the exact machine,
 and adds cuts there, until there is nothing to add (`option_combination`, `search`). The verdict is
 asked at the worst poses (`allocate`); a design is written as a machine file (`design_file`).
+
+For a share of all machines the cuts are of quantiles, which follow from variances
+(`statistical_judge`, `statistical_search`, `statistical_allocation`); machines drawn anew have to
+show it (`shares_kept`). All over the box a design is proven by bounds (`region_proof`).
 """

@@ -6,44 +6,28 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from truepose.arrays import Floats
-from truepose.design.judge import QUICK, THOROUGH, Judge, WorstPlace
-from truepose.design.judged_poses import JudgedPoses
-from truepose.design.option_combination import GradedDesign, OptionCombination
-from truepose.design.options import machine_of, require_options
+from truepose.design.judge import THOROUGH
+from truepose.design.one_allocation import OneAllocation
+from truepose.design.options import require_options
 from truepose.design.programme import require_solver
-from truepose.design.result import (
-    NOT_PROVEN,
-    THESE_POSES,
-    Allocation,
-    ChosenGrade,
-    ChosenOption,
-    Contribution,
-    WorstPose,
-)
-from truepose.design.search import DesignSearch, SearchOutcome, Task, at_worst
+from truepose.design.result import Allocation
+from truepose.design.search import Task
 from truepose.design.space import DesignSpace
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.runs.arguments import checked
 from truepose.runs.poses import Progress
 from truepose.runs.quantities import quantities
-from truepose.runs.run import Run
-from truepose.verdict.accuracy import accuracy, required_states
-from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET
+from truepose.verdict.accuracy import required_states
+from truepose.verdict.answer import AFTER, BEFORE
 
 CONDITION = "condition"
 """What the file's own condition is called beside its cases."""
 
-PROVEN = 24
-"""Of the worst poses, at how many the verdict is asked, in each case."""
+MOST_ALTERNATIVES = 20
 
-SHOWN = 12
-"""Worst poses that a result tells of."""
-
-KNOWN, OTHERS = "known deviations", "other bands"
+LEAST_SHARE, MOST_SHARE = 0.5, 0.999
+"""Shares of all machines that a design is chosen for: beyond, a few thousand draws say little."""
 
 
 @checked
@@ -52,8 +36,12 @@ def allocate(
     *,
     state: str = BEFORE,
     worst: bool = False,
+    statistical: float | None = None,
+    all_poses: bool = False,
     reserve: float = 0.01,
     gap: float = 0.01,
+    alternatives: int = 0,
+    region: bool = False,
     progress: Progress | None = None,
 ) -> Allocation:
     """Choose a grade for every tie and an option for every choice of `[cost]`, at least cost.
@@ -62,8 +50,13 @@ def allocate(
     targets of `[accuracy]` less the share `reserve`, over the whole workspace, in the file's
     condition and in every `[case.NAME]`. `state`: "before compensation" or "after compensation".
     `gap`: by which share of the cost a cheaper design may be left undiscovered. `worst`: also where
-    the file asks the accuracy of a share of all machines. `progress` is called with (programmes
-    solved, 0). Ctrl-C gives the best design and the bound of then.
+    the file asks the accuracy of a share of all machines. `statistical`: such a share, 0.95, by
+    default that of the file: so many machines are within the targets, at each pose by itself or,
+    with `all_poses`, at all of them. `alternatives`: so many other designs with what they cost,
+    of other options, or without one of the grades of what is tied, for the worst case.
+    `region`: prove the design all over the box too, before compensation, if that can be.
+    `progress` is called with (programmes solved, 0). Ctrl-C gives the best design and the bound of
+    then.
 
     Raises `RequestError`: no-cost, bad-allocation, option-not-set, bad-gap, no-accuracy,
     unknown-choice, no-workspace, no-pose-left, extra-missing; target-out-of-reach where no choice
@@ -71,287 +64,109 @@ def allocate(
     """
     (asked,) = _state(state)
     space = DesignSpace(machine)
-    judged, targets = _targets(machine, worst=worst)
+    share = _asked_share(machine, worst=worst, statistical=statistical, all_poses=all_poses)
+    judged, targets = _targets(machine)
     limits = _limits(targets, reserve)
+    if region and (share is not None or asked == AFTER):
+        raise RequestError(
+            Problem(
+                "bad-allocation",
+                "a design is proven all over the box for the worst case before compensation",
+                found=asked if share is None else "a share of all machines",
+                expected="--worst and --before, or no --region",
+            )
+        )
+    others = _alternatives(alternatives, share)
     require_solver()
     require_options(judged, space)
-    task = Task(
-        judged,
-        {CONDITION: judged.condition, **judged.cases},
-        limits,
-        asked == AFTER,
-        _gap(gap),
-        THOROUGH,
+    conditions = {CONDITION: judged.condition, **judged.cases}
+    if share is not None:
+        from truepose.design.statistical_allocation import StatisticalAllocation
+        from truepose.design.statistical_search import StatisticalTask
+
+        sampled = StatisticalTask(
+            judged,
+            conditions,
+            targets,
+            reserve,
+            asked,
+            asked == AFTER,
+            _gap(gap),
+            share,
+            all_poses,
+        )
+        return StatisticalAllocation(space, sampled, limits, progress).result()
+    task = Task(judged, conditions, limits, asked == AFTER, _gap(gap), THOROUGH, others)
+    return OneAllocation(
+        judged, space, task, asked, targets, reserve, progress, region=region
+    ).result()
+
+
+def _alternatives(alternatives: int, share: float | None) -> int:
+    """How many other designs are asked for. Raises `RequestError` (bad-allocation)."""
+    whole = isinstance(alternatives, int) and not isinstance(alternatives, bool)
+    if whole and 0 <= alternatives <= MOST_ALTERNATIVES and (share is None or not alternatives):
+        return alternatives
+    raise RequestError(
+        Problem(
+            "bad-allocation",
+            "so many other designs are not looked for",
+            found=str(alternatives) if share is None else "a share of all machines",
+            expected=f"a whole number up to {MOST_ALTERNATIVES}, for the worst case",
+        )
     )
-    return OneAllocation(judged, space, task, asked, targets, reserve, progress).result()
 
 
-class OneAllocation:
-    """One allocation, from the search to its result."""
-
-    def __init__(
-        self,
-        machine: Machine,
-        space: DesignSpace,
-        task: Task,
-        state: str,
-        targets: tuple[float | None, ...],
-        reserve: float,
-        progress: Progress | None,
-    ) -> None:
-        self.machine, self.space, self.task, self.state = machine, space, task, state
-        self.targets, self.reserve = targets, reserve
-        self.kinds = list(quantities(machine.components))
-        self.cases = list(task.conditions)
-        self.search = DesignSearch(space, task, self.beyond, progress)
-        self._proven: dict[tuple[object, ...], tuple[str, int]] = {}
-
-    def result(self) -> Allocation:
-        """Search, and say what came of it."""
-        outcome = self.search.run()
-        if outcome.best is None or outcome.candidate is None:
-            raise self._out_of_reach(outcome)
-        design, candidate = outcome.best, outcome.candidate
-        if not outcome.interrupted and self._key(design) not in self._proven:
-            self.beyond(candidate, design)
-        proven, poses = self._proven.get(self._key(design), (NOT_PROVEN, 0))
-        chosen = machine_of(self.machine, self.space, design.combination)
-        bands = self.search.bands(chosen)
-        return Allocation(
-            machine=self.machine,
-            designed=bands.designed(candidate.halves(design.grades)),
-            state=self.state,
-            cases=tuple(self.cases),
-            unit=self.space.costs.unit,
-            cost=design.cost,
-            lower_bound=outcome.bound,
-            targets={
-                kind: target
-                for kind, target in zip(self.kinds, self.targets, strict=True)
-                if target is not None
-            },
-            reserve=self.reserve,
-            options=self._options(design),
-            grades=self._grades(design),
-            worst_poses=self._worst(candidate, design),
-            contributions=self._contributions(candidate, design),
-            proven=proven,
-            poses_proven=poses,
-            combinations=len(self.space.combinations),
-            impossible=outcome.impossible,
-            one_grade=outcome.alike[0],
-            one_width=outcome.alike[1],
-            rounds=outcome.rounds,
-            left_out=design.judgement.left_out,
-            interrupted=outcome.interrupted,
-            gap_asked=self.task.gap,
-            changes=tuple(self.space.option_settings(design.combination)),
-        )
-
-    # --- the proof
-
-    def beyond(self, candidate: OptionCombination, design: GradedDesign) -> list[WorstPlace]:
-        """Ask the verdict at the worst poses; what it finds beyond the targets, as witnesses."""
-        halves = candidate.halves(design.grades)
-        machine = candidate.judge.models[0].bands.designed(halves)
-        worst = at_worst(design.judgement.witnesses, PROVEN * len(self.cases))
-        beyond: list[WorstPlace] = []
-        every, count = True, 0
-        for number, condition in enumerate(self.task.conditions.values()):
-            poses = np.array([pose for case, pose in worst if case == number])
-            if not len(poses):
-                continue
-            count += len(poses)
-            answers = accuracy(machine, poses, condition, states=(self.state,))
-            for answer in answers:
-                if answer.asked is None:
-                    continue
-                every = every and answer.answer == MET
-                if answer.answer == NOT_MET:
-                    at = candidate.judge.at_pose(number, answer.witness.pose, halves)
-                    beyond += [
-                        dataclasses.replace(
-                            one,
-                            exact=answer.witness.value,
-                            share=answer.witness.value
-                            / (self.task.limits[one.quantity] or math.inf),
-                        )
-                        for one in at
-                        if self.kinds[one.quantity] == answer.quantity
-                    ]
-        proven = THESE_POSES if every and count else NOT_PROVEN
-        self._proven[self._key(design)] = proven, count
-        return beyond
-
-    def _key(self, design: GradedDesign) -> tuple[object, ...]:
-        return design.combination, design.grades
-
-    # --- what the result says
-
-    def _options(self, design: GradedDesign) -> tuple[ChosenOption, ...]:
-        return tuple(
-            ChosenOption(slot.choice.name, slot.parts, option.name, option.cost)
-            for slot, option in zip(
-                self.space.slots, self.space.options(design.combination), strict=True
-            )
-        )
-
-    def _grades(self, design: GradedDesign) -> tuple[ChosenGrade, ...]:
-        columns = self.space.columns(design.grades).tolist()
-        chosen = []
-        for tie, grade, column in zip(self.space.ties, design.grades, columns, strict=True):
-            row = self.space.rows[tie.row]
-            chosen.append(
-                ChosenGrade(
-                    tie.name,
-                    row.of,
-                    row.grades[grade],
-                    float(self.space.cost[column]),
-                    tuple(self.space.features[at] for at in tie.features),
-                    tuple(self.space.halves[column, list(tie.features)].tolist()),
-                    row.unit,
-                )
-            )
-        return tuple(chosen)
-
-    def _worst(self, candidate: OptionCombination, design: GradedDesign) -> tuple[WorstPose, ...]:
-        """The worst poses of the design, and those that decide what the relaxation costs."""
-        halves = candidate.halves(design.grades)
-        every = design.judgement.witnesses
-        # The worst of each quantity in each condition, however little, and the worst of all.
-        of_each = {(one.case, one.quantity): one for one in reversed(every)}
-        kept = [*every[:SHOWN], *of_each.values()]
-        keyed = {witness.place: (witness, 0.0) for witness in kept}
-        for key, price in candidate.duals.items():
-            of_cut = candidate.cuts[key].witness
-            for witness in candidate.judge.at_pose(of_cut.case, of_cut.pose, halves):
-                if witness.quantity == of_cut.quantity:
-                    known, before = keyed.get(witness.place, (witness, 0.0))
-                    keyed[witness.place] = known, before + price
-        ordered = sorted(keyed.values(), key=lambda one: -one[0].share)
-        return tuple(self._pose_of(witness, price) for witness, price in ordered)
-
-    def _pose_of(self, witness: WorstPlace, price: float) -> WorstPose:
-        limit = self.task.limits[witness.quantity]
-        assert limit is not None
-        return WorstPose(
-            self.cases[witness.case],
-            self.kinds[witness.quantity],
-            witness.pose,
-            witness.direction,
-            witness.exact,
-            witness.linear,
-            limit,
-            price,
-        )
-
-    def _contributions(
-        self, candidate: OptionCombination, design: GradedDesign
-    ) -> tuple[Contribution, ...]:
-        """What adds to the worst error of each quantity, as filed and designed."""
-        before_judge = Judge(
-            self.search.models(self.search.bands(self.machine)),
-            JudgedPoses.of(self.machine),
-            self.task.limits,
-            QUICK,
-        )
-        filed = before_judge.models[0].bands.filed
-        before = before_judge.assess(filed).witnesses
-        after = design.judgement.witnesses
-        halves = candidate.halves(design.grades)
-        contributions = []
-        for quantity, kind in enumerate(self.kinds):
-            if self.task.limits[quantity] is None:
-                continue
-            one = self._parts(before_judge, before, quantity, filed)
-            other = self._parts(candidate.judge, after, quantity, halves)
-            contributions += [Contribution(kind, name, one[name], other[name]) for name in other]
-        return tuple(contributions)
-
-    def _parts(
-        self, judge: Judge, witnesses: Sequence[WorstPlace], quantity: int, halves: Floats
-    ) -> dict[str, float]:
-        """What adds up to the linear error of the worst witness of a quantity; NaN of none."""
-        rows = dict.fromkeys((KNOWN, OTHERS, *(row.of for row in self.space.rows)), math.nan)
-        worst = next((one for one in witnesses if one.quantity == quantity), None)
-        if worst is None:
-            return rows
-        model = judge.models[worst.case]
-        errors = model.at(worst.pose[np.newaxis])
-        along = worst.direction[np.newaxis]
-        columns = model.kinds[quantity]
-        both, signed = model.support(errors, columns, along)
-        known = float(along[0, : columns.size] @ errors.value[0, columns])
-        rows[KNOWN], rows[OTHERS] = known, max(float(both[0]) - known, 0.0)
-        moved = (signed[0] * halves)[:, np.newaxis] * model.bands.member
-        row_of = np.array(
-            [number for number, row in enumerate(self.space.rows) for _ in row.features]
-        )
-        for number, row in enumerate(self.space.rows):
-            own = moved[row_of == number].sum(axis=0)
-            before = 0.0 if math.isnan(rows[row.of]) else rows[row.of]
-            rows[row.of] = before + float(np.abs(own).sum())
-        return rows
-
-    def _out_of_reach(self, outcome: SearchOutcome) -> RequestError:
-        """Why there is no design."""
-        assert outcome.shortfall is not None
-        combination, witness = outcome.shortfall
-        options = ", ".join(option.name for option in self.space.options(combination))
-        of_options = f", with {options}" if options else ""
-        if witness is None:
-            run = Run(self.machine)
-            if not any(True for _ in run.with_variables()):
-                return run.no_pose_left()
-            return RequestError(
-                Problem(
-                    "target-out-of-reach",
-                    "the machine cannot be commanded to a pose of its workspace, "
-                    f"whatever is chosen{of_options}",
-                    self.machine.file,
-                    path="workspace",
-                    found="a pose that its known deviations put out of reach",
-                    expected="a workspace that the machine reaches",
-                    hint="`truepose check` says which pose, and why",
-                )
-            )
-        kind, limit = self.kinds[witness.quantity], self.task.limits[witness.quantity]
-        assert limit is not None
-        worst = max(witness.exact, witness.linear)
-        return RequestError(
+def _asked_share(
+    machine: Machine, *, worst: bool, statistical: float | None, all_poses: bool
+) -> float | None:
+    """The share of all machines that is to keep the targets; None: every one inside the bands."""
+    if statistical is not None and worst:
+        raise RequestError(
             Problem(
-                "target-out-of-reach",
-                f"no choice keeps the {kind} within its target: at {self._pose(witness)} "
-                f"({self.cases[witness.case]}) {self._said(kind, worst)} is left with everything "
-                f"at its finest{of_options}",
-                self.machine.file,
-                path="accuracy",
-                found=f"{self._said(kind, worst)}",
-                expected=f"at most {self._said(kind, limit)}, the target less the reserve",
-                hint="finer bands, other options, a wider target, or --after compensation",
+                "bad-allocation",
+                "a design is chosen for the worst case, or for a share of all machines",
+                found="both",
+                expected="--worst or --statistical",
             )
         )
+    share = statistical if statistical is not None else machine.accuracy.at
+    share = None if worst else share
+    if share is None:
+        if all_poses:
+            raise RequestError(
+                Problem(
+                    "bad-allocation",
+                    "at all poses at once is asked of a share of all machines",
+                    found="the worst case, which is at all poses",
+                    expected="--statistical 95 --all-poses",
+                )
+            )
+        return None
+    return required_share(share)
 
-    def _pose(self, witness: WorstPlace) -> str:
-        units = self.machine.shown
-        parts = []
-        for name, value in zip(self.machine.commanded, witness.pose.tolist(), strict=True):
-            unit = units.pose(name)
-            parts.append(f"{name} {value * unit.per_si:.6g} {unit.label}")
-        return ", ".join(parts)
 
-    def _said(self, kind: str, value: float) -> str:
-        if math.isinf(value):
-            return "a machine that cannot be assembled"
-        unit = self.machine.shown.error(kind)
-        return f"{value * unit.per_si:.4g} {unit.label}"
+def required_share(share: float) -> float:
+    """A share of all machines. Raises `RequestError` (bad-allocation)."""
+    fine = isinstance(share, float | int) and not isinstance(share, bool)
+    if fine and LEAST_SHARE <= share <= MOST_SHARE:
+        return float(share)
+    raise RequestError(
+        Problem(
+            "bad-allocation",
+            "no design is chosen for this share of all machines",
+            found=str(share),
+            expected=f"a share from {LEAST_SHARE:.0%} to {MOST_SHARE:.1%}, such as 0.95",
+            hint=f"{share:g} % is {share / 100.0:g}" if fine and 1.0 < share <= 100.0 else None,
+        )
+    )
 
 
 def _state(state: str) -> tuple[str, ...]:
     return required_states((state,))
 
 
-def _targets(machine: Machine, *, worst: bool) -> tuple[Machine, tuple[float | None, ...]]:
+def _targets(machine: Machine) -> tuple[Machine, tuple[float | None, ...]]:
     """The machine, of whose every member the accuracy is asked, and the target of each quantity."""
     asked = machine.accuracy
     if not asked.asks:
@@ -363,19 +178,6 @@ def _targets(machine: Machine, *, worst: bool) -> tuple[Machine, tuple[float | N
                 path="accuracy",
                 found="nothing",
                 expected='[accuracy] with target = "0.5 mm", or angle_target',
-            )
-        )
-    if asked.at is not None and not worst:
-        raise RequestError(
-            Problem(
-                "bad-allocation",
-                "the file asks its accuracy of a share of all machines, and designs are chosen for "
-                "every machine inside the bands",
-                machine.file,
-                path="accuracy.at",
-                found=asked.at_text,
-                expected='at = "worst"',
-                hint="--worst (worst=True) chooses for the worst case, which is dearer",
             )
         )
     machine = dataclasses.replace(machine, accuracy=dataclasses.replace(asked, at=None))

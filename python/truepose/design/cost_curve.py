@@ -89,6 +89,8 @@ def cost_curve(
     *,
     state: str = BEFORE,
     worst: bool = False,
+    statistical: float | None = None,
+    all_poses: bool = False,
     reserve: float = 0.01,
     gap: float = 0.01,
     progress: Progress | None = None,
@@ -120,7 +122,15 @@ def cost_curve(
             points.append(CurvePoint(target, math.inf, math.inf, None))
             continue
         try:
-            design = allocate(own, state=state, worst=worst, reserve=reserve, gap=gap)
+            design = allocate(
+                own,
+                state=state,
+                worst=worst,
+                statistical=statistical,
+                all_poses=all_poses,
+                reserve=reserve,
+                gap=gap,
+            )
         except KeyboardInterrupt:
             if not points:
                 raise

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.arrays import Floats
+from truepose.arrays import Floats, Indices
 from truepose.design.judge import Effort, Findings, Judge, WorstPlace
 from truepose.design.programme import Programme, ProgrammeSolution
 from truepose.design.space import Combination, DesignSpace
@@ -31,6 +31,11 @@ _ALIKE = 1e-4
 """By which share a design with one grade for all, told for comparison, may be beyond a limit."""
 
 _HALVINGS = 20
+
+_NONE: Indices = np.empty(0, np.intp)
+
+_MOST_PLAINER = 20
+"""Rounds of cuts for a design of fewer distinct grades."""
 
 _MOST_ROUNDS = 400
 """Rounds of cuts: far more than any design needed, which ended after some tens."""
@@ -78,6 +83,7 @@ class OptionCombination:
         self.bound = self.option_cost
         self.duals: dict[tuple[object, ...], float] = {}
         self._too_coarse: list[Floats] = []
+        self._forbidden = _NONE
         self._programme = Programme(space.cost, space.tie_of)
         self._tick = tick
 
@@ -161,6 +167,45 @@ class OptionCombination:
         self._cut(witnesses, exact=True)
         if any(math.isinf(witness.exact) for witness in witnesses):
             self._too_coarse.append(self.space.chosen(design.grades))
+
+    def without(self, columns: Indices, gap: float) -> GradedDesign | None:
+        """The design within `gap` of the cheapest that has none of some columns."""
+        self._forbidden = columns
+        try:
+            return self.cheapest(gap, None)
+        finally:
+            self._forbidden = _NONE
+
+    def estimate_without(self, columns: Indices) -> float:
+        """What the relaxation of the cuts costs that has none of some columns."""
+        self._forbidden = columns
+        try:
+            solution = self._programme.relaxed(*self._rows(exact=True))
+        finally:
+            self._forbidden = _NONE
+        return math.inf if solution is None else self.option_cost + solution.cost
+
+    def plainest(self, known: GradedDesign, budget: float) -> GradedDesign | None:
+        """A clean design of fewer distinct grades than `known` has, within the budget, if found.
+
+        Two ties have the same grade where it is the same one of the same row of the file.
+        """
+        kinds = self.space.kind_of
+        fewest = len(np.unique(kinds[self.space.columns(known.grades)]))
+        start = self.space.chosen(known.grades)
+        for _ in range(_MOST_PLAINER):
+            self._tick()
+            coefficients, most = self._rows(exact=True)
+            paid = budget - self.option_cost
+            solution = self._programme.plainest(coefficients, most, kinds, paid, start)
+            if solution is None or len(np.unique(kinds[solution.x > 0.5])) >= fewest:
+                return None
+            design = self._design(solution.x, self._judged(solution.x, self.judge.effort))
+            exceeding = design.judgement.exceeding
+            if not exceeding:
+                return design
+            self.cut(exceeding, design)
+        return None
 
     def bound_of_linear_model(self, gap: float) -> float:
         """The bound of whole grades under the cuts of the linear model alone."""
@@ -278,6 +323,11 @@ class OptionCombination:
             finer = np.array([self._as_coarse(x) for x in self._too_coarse])
             coefficients = np.concatenate([coefficients, finer])
             most = np.concatenate([most, np.full(len(finer), len(self.space.ties) - 1.0)])
+        if self._forbidden.size:
+            row = np.zeros((1, self.space.cost.size))
+            row[0, self._forbidden] = 1.0
+            coefficients = np.concatenate([coefficients, row])
+            most = np.append(most, 0.0)
         return coefficients, most
 
     def _as_coarse(self, x: Floats) -> Floats:

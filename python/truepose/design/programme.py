@@ -28,6 +28,9 @@ FEASIBLE = 1e-9
 _ROUNDING = 1e-9
 """Of a bound: what the solver's arithmetic may have put on it."""
 
+_NODES = 500
+"""Nodes of the search for fewer kinds of columns: a number, so that it ends the same everywhere."""
+
 _LISTEN = 0.05
 """Seconds between two looks at whether Ctrl-C was pressed."""
 
@@ -70,6 +73,50 @@ class Programme:
         """
         return self._solved(coefficients, most, gap, start)
 
+    def plainest(
+        self, coefficients: Floats, most: Floats, kind_of: Indices, budget: float, start: Floats
+    ) -> ProgrammeSolution | None:
+        """Whole columns of as few kinds as are found, of which none costs more than the `budget`.
+
+        `kind_of` (x,): the kind of each column, from 0; `start` (x,): columns that are allowed.
+        Ends after `_NODES` nodes: fewer kinds may then be possible. Raises `KeyboardInterrupt`.
+        """
+        import highspy
+
+        stop = _Stop()
+        solver = _solver(stop)
+        kinds = int(kind_of.max()) + 1
+        # A kind is dearer than all that money can say; of equally many the cheapest.
+        self._fill(solver, coefficients, most, whole=True, share=0.5 / max(budget, 1e-300))
+        count = self._cost.size
+        for kind in range(kinds):
+            solver.addCol(1.0, 0.0, 1.0, 0, np.empty(0, np.int32), np.empty(0))
+            members = np.flatnonzero(kind_of == kind)
+            for column in members.tolist():
+                pair = np.array([column, count + kind], np.int32)
+                solver.addRow(-highspy.kHighsInf, 0.0, 2, pair, np.array([1.0, -1.0]))
+        whole = np.full(kinds, int(highspy.HighsVarType.kInteger), np.uint8)
+        solver.changeColsIntegrality(kinds, np.arange(count, count + kinds, dtype=np.int32), whole)
+        paid = np.arange(count, dtype=np.int32)
+        unit = budget or 1.0
+        solver.addRow(-highspy.kHighsInf, 1.0 + FEASIBLE, count, paid, self._cost / unit)
+        solver.setOptionValue("mip_max_nodes", _NODES)
+        used = np.zeros(kinds)
+        used[np.unique(kind_of[start > 0.5])] = 1.0
+        every = np.concatenate([start, used])
+        solver.setSolution(every.size, np.arange(every.size, dtype=np.int32), every)
+        _run(solver, stop)
+        status = solver.getModelStatus()
+        if status == highspy.HighsModelStatus.kInterrupt:
+            raise KeyboardInterrupt
+        if (
+            solver.getInfo().primal_solution_status
+            != highspy.SolutionStatus.kSolutionStatusFeasible
+        ):
+            return None
+        x = self._rounded(np.asarray(solver.getSolution().col_value, np.float64)[:count])
+        return ProgrammeSolution(x, float(self._cost @ x), 0.0, np.zeros(len(most)))
+
     def _solved(
         self, coefficients: Floats, most: Floats, gap: float | None, start: Floats | None = None
     ) -> ProgrammeSolution | None:
@@ -90,16 +137,22 @@ class Programme:
         return self._read(solver, len(most), whole=gap is not None)
 
     def _fill(
-        self, solver: highspy.Highs, coefficients: Floats, most: Floats, *, whole: bool
+        self,
+        solver: highspy.Highs,
+        coefficients: Floats,
+        most: Floats,
+        *,
+        whole: bool,
+        share: float | None = None,
     ) -> None:
+        """Columns and rows; costs in their own unit, or times `share`."""
         import highspy
 
         count, none = self._cost.size, np.empty(0)
+        costs = self._cost / self._unit if share is None else self._cost * share
         zeros, ones = np.zeros(count), np.ones(count)
         start = np.zeros(count, np.int32)
-        solver.addCols(
-            count, self._cost / self._unit, zeros, ones, 0, start, np.empty(0, np.int32), none
-        )
+        solver.addCols(count, costs, zeros, ones, 0, start, np.empty(0, np.int32), none)
         if whole:
             kind = np.full(count, int(highspy.HighsVarType.kInteger), np.uint8)
             solver.changeColsIntegrality(count, np.arange(count, dtype=np.int32), kind)

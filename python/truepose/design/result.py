@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -28,8 +29,14 @@ from truepose.runs.quantities import quantities
 if TYPE_CHECKING:
     import xarray as xr
 
-NOT_PROVEN, THESE_POSES = "none", "these poses"
+    from truepose.design.region_proof import RegionProof
+    from truepose.design.shares_kept import SharesKept
+
+NOT_PROVEN, THESE_POSES, REGION = "none", "these poses", "region"
 """How far a design is proven."""
+
+KNOWN, OTHERS = "known deviations", "other bands"
+"""What adds to an error besides the rows of the file."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +96,19 @@ class Contribution:
     after: float
 
 
+@dataclass(frozen=True)
+class Alternative:
+    """Another design that keeps the targets, what it costs, and in what it differs.
+
+    `differs`: what it has, and what the design has instead, such as "rods: steel, not carbon".
+    """
+
+    cost: float
+    options: tuple[ChosenOption, ...]
+    grades: tuple[ChosenGrade, ...]
+    differs: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Allocation(Represented):
     """The cheapest design found for a machine, as `truepose.allocate` returns it.
@@ -96,11 +116,15 @@ class Allocation(Represented):
     `designed`: the machine with it. `cost`, and `lower_bound` of what any design costs that keeps
     target less reserve to first order, in `unit`; `gap` between them, of the cost. `targets` by
     quantity, m or rad, kept in `state` with a share `reserve` left. `proven`: "these poses" where
-    the verdict proves the targets at the worst poses, the number of them `poses_proven`, else
-    "none". `worst_poses`: the worst first. `one_grade`: what it would cost with all ties at the
-    same place of their lists, `one_width` also between two grades; infinite where that keeps
-    nothing, or there is one tie. `combinations` of options, of which some are `impossible`;
-    `rounds`: programmes solved. `left_out`: poses that were looked at and that the machine cannot
+    the verdict proves the targets at the worst poses, the number of them `poses_proven`, "region"
+    where `truepose.bounds` proves them all over the box (`region_proof` says of that, where it was
+    asked for), else "none". `worst_poses`: the worst first. `one_grade`: what it would cost with
+    all ties at the same place of their lists, `one_width` also between two grades; infinite where
+    that keeps nothing, or there is one tie. `alternatives`: other designs, the cheapest first.
+    `combinations` of options, of which some are `impossible`; `rounds`: programmes solved. Of a
+    design for a `share` of all machines `kept` says which share keeps the targets, at each pose
+    and at all; with `all_poses` the latter was asked. Nothing of it is proven, and `lower_bound`
+    and `gap` are missing (NaN). `left_out`: poses that were looked at and that the machine cannot
     take. `interrupted`: Ctrl-C came before the gap was reached.
     """
 
@@ -127,14 +151,23 @@ class Allocation(Represented):
     left_out: int
     interrupted: bool
     gap_asked: float
+    alternatives: tuple[Alternative, ...] = ()
+    region_proof: RegionProof | None = None
+    share: float | None = None
+    all_poses: bool = False
+    kept: SharesKept | None = None
     changes: tuple[str, ...] = field(default=(), repr=False)
     """What the options set, key=value."""
 
     def _facts(self) -> Facts:
         yield "machine", self.machine.name
         yield "cost", f"{self.cost:.6g} {self.unit}".strip()
-        yield "lower bound", self.lower_bound
-        yield "gap", f"{100.0 * self.gap:.2g} %"
+        if self.kept is None:
+            yield "lower bound", self.lower_bound
+            yield "gap", f"{100.0 * self.gap:.2g} %"
+        else:
+            yield "share of machines at each pose", self.kept.each_pose
+            yield "share of machines at all poses", self.kept.all_poses
         yield "options", ", ".join(f"{one.choice}: {one.option}" for one in self.options) or None
         yield "proven", self.proven
         yield "interrupted", self.interrupted
@@ -142,7 +175,14 @@ class Allocation(Represented):
     @property
     def gap(self) -> float:
         """By which share of the cost a cheaper design is not excluded."""
+        if math.isnan(self.lower_bound):
+            return math.nan
         return 0.0 if self.cost <= 0.0 else max(0.0, 1.0 - self.lower_bound / self.cost)
+
+    @property
+    def distinct_grades(self) -> int:
+        """How many different grades there are, of each row of the file by itself."""
+        return len({(one.of, one.grade) for one in self.grades})
 
     def text(self, beside: str | Path | None = None) -> str:
         """The machine file with the design in it, all else as it stands in the file.
@@ -227,6 +267,12 @@ def _dataset(result: Allocation) -> xr.Dataset:
             money,
             "by how much the relaxation's cost falls where the limit rises by all of itself",
         ),
+        "alternative_cost": variable(
+            ("alternative",),
+            [one.cost for one in result.alternatives],
+            money,
+            "cost of the other design",
+        ),
         "contribution_before": variable(
             ("contributor", "quantity"), contributed[0], "quantity", "at the worst pose as filed"
         ),
@@ -251,6 +297,11 @@ def _dataset(result: Allocation) -> xr.Dataset:
         "worst": label("worst", np.arange(len(worst)), "number of the pose, the worst first"),
         "worst_case": label("worst", [one.case for one in worst], "condition"),
         "worst_quantity": label("worst", [one.quantity for one in worst], "what errs so much"),
+        "alternative": label(
+            "alternative",
+            text(["; ".join(one.differs) for one in result.alternatives], dtype=object),
+            "in what the other design differs",
+        ),
         "contributor": label("contributor", names, "what adds to the worst error"),
         **quantity_coords(machine),
     }
@@ -270,10 +321,26 @@ def _dataset(result: Allocation) -> xr.Dataset:
         "combinations": result.combinations,
         "combinations_impossible": result.impossible,
         "rounds": result.rounds,
+        "distinct_grades": result.distinct_grades,
         "poses_left_out": result.left_out,
         "options_set": "; ".join(result.changes),
         "interrupted": int(result.interrupted),
     }
+    if result.region_proof is not None:
+        attrs |= {
+            "region_unproven": result.region_proof.why,
+            "region_boxes": result.region_proof.boxes,
+        }
+    if result.kept is not None:
+        attrs |= {
+            "share": result.share or 0.0,
+            "at_all_poses": int(result.all_poses),
+            "share_each_pose": result.kept.each_pose,
+            "share_each_pose_error": result.kept.each_pose_error,
+            "share_all_poses": result.kept.all_poses,
+            "share_all_poses_error": result.kept.all_poses_error,
+            "share_poses": result.kept.poses,
+        }
     return labelled_dataset(data, labels, attrs)
 
 
@@ -282,9 +349,13 @@ def _label(option: ChosenOption) -> str:
 
 
 __all__ = [
+    "KNOWN",
     "NOT_PROVEN",
+    "OTHERS",
+    "REGION",
     "THESE_POSES",
     "Allocation",
+    "Alternative",
     "ChosenGrade",
     "ChosenOption",
     "Contribution",

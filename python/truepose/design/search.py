@@ -30,7 +30,10 @@ Confirm = Callable[[OptionCombination, GradedDesign], Sequence[WorstPlace]]
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is asked: the machine, its conditions by name, the limits (q,) and the effort."""
+    """What is asked: the machine, its conditions by name, the limits (q,) and the effort.
+
+    `alternatives`: how many designs besides the best are looked for.
+    """
 
     machine: Machine
     conditions: dict[str, Condition]
@@ -38,6 +41,7 @@ class Task:
     after: bool
     gap: float
     effort: Effort = THOROUGH
+    alternatives: int = 0
 
 
 @dataclass(eq=False)
@@ -46,7 +50,8 @@ class SearchOutcome:
 
     Of combinations that cannot be (`shortfall`) the one whose worst error, with everything at its
     finest, is least. `rounds`: programmes solved. `interrupted`: by Ctrl-C. `alike`: what it costs
-    with all ties at one place of their lists, at a grade and between two.
+    with all ties at one place of their lists, at a grade and between two. `alternatives`: other
+    designs, the cheapest first.
     """
 
     best: GradedDesign | None = None
@@ -57,6 +62,7 @@ class SearchOutcome:
     rounds: int = 0
     interrupted: bool = False
     alike: tuple[float, float] = (math.inf, math.inf)
+    alternatives: tuple[GradedDesign, ...] = ()
     bounds: dict[Combination, float] = field(default_factory=dict)
 
 
@@ -93,6 +99,8 @@ class DesignSearch:
             possible = sorted(self._possible(), key=lambda one: one.bound)
             for candidate in possible:
                 self._integer(candidate)
+            self._plainer()
+            self._alternatives(possible)
             outcome.alike = (
                 self._alike(possible, between=False),
                 self._alike(possible, between=True),
@@ -179,19 +187,74 @@ class DesignSearch:
         if self._too_dear(candidate.bound):
             return
         candidate.add_cuts(tuple(self._shared.values()))
-        while True:
-            own = outcome.best if outcome.candidate is candidate else None
-            design = candidate.cheapest(gap, own)
-            if design is None:
-                break
-            beyond = [witness for witness in self._confirm(candidate, design) if witness.exceeds]
-            if not beyond:
-                self._better(candidate, design)
-                break
-            candidate.cut(beyond, design)
+        own = outcome.best if outcome.candidate is candidate else None
+        design = self._confirmed(candidate, lambda: candidate.cheapest(gap, own))
+        if design is not None:
+            self._better(candidate, design)
         self._share(candidate)
         outcome.bounds[candidate.combination] = candidate.bound_of_linear_model(0.5 * gap)
         candidate.judge.forget()
+
+    def _confirmed(
+        self, candidate: OptionCombination, next_design: Callable[[], GradedDesign | None]
+    ) -> GradedDesign | None:
+        """The first `next_design` that is found to keep its limits; the others are cut off."""
+        while (design := next_design()) is not None:
+            beyond = [witness for witness in self._confirm(candidate, design) if witness.exceeds]
+            if not beyond:
+                return design
+            candidate.cut(beyond, design)
+        return None
+
+    def _plainer(self) -> None:
+        """Of the designs within the gap take one with fewer distinct grades, if one is found."""
+        outcome, best, candidate = self.outcome, self.outcome.best, self.outcome.candidate
+        if best is None or candidate is None or len(self.space.ties) < 2:
+            return
+        bound = min(outcome.bounds.values())
+        budget = max(best.cost, bound / (1.0 - self.task.gap) * (1.0 - 1e-9))
+        plainer = self._confirmed(candidate, lambda: candidate.plainest(best, budget))
+        if plainer is not None:
+            outcome.best = plainer
+        candidate.judge.forget()
+
+    def _alternatives(self, possible: Sequence[OptionCombination]) -> None:
+        """The cheapest designs with other options, or without one of the grades of what is tied."""
+        outcome, best, own = self.outcome, self.outcome.best, self.outcome.candidate
+        if not self.task.alternatives or best is None or own is None:
+            return
+        asked: list[tuple[float, OptionCombination, Indices | None]] = [
+            (candidate.bound, candidate, None) for candidate in possible if candidate is not own
+        ]
+        # Without a grade for any tie of its row: to exchange two joints' grades is no other design.
+        tied = {tie.row for tie in self.space.ties if len(tie.features) > 1}
+        used = self.space.kind_of[self.space.columns(best.grades)]
+        for row, kind in sorted({*zip((tie.row for tie in self.space.ties), used, strict=True)}):
+            if row in tied:
+                columns = np.flatnonzero(self.space.kind_of == kind)
+                asked.append((own.estimate_without(columns), own, columns))
+        others: list[GradedDesign] = []
+        for estimate, candidate, barred in sorted(asked, key=lambda one: one[0]):
+            if len(others) == self.task.alternatives and estimate >= others[-1].cost:
+                break
+            if math.isinf(estimate):
+                break
+            design = self._confirmed(candidate, self._other(candidate, barred))
+            candidate.judge.forget()
+            known = {(one.combination, one.grades) for one in (best, *others)}
+            if design is not None and (design.combination, design.grades) not in known:
+                others = sorted([*others, design], key=lambda one: one.cost)
+                others = others[: self.task.alternatives]
+        outcome.alternatives = tuple(others)
+
+    def _other(
+        self, candidate: OptionCombination, barred: Indices | None
+    ) -> Callable[[], GradedDesign | None]:
+        """How a design is found of other options, or without some columns."""
+        gap = self.task.gap
+        if barred is None:
+            return lambda: candidate.cheapest(gap, None)
+        return lambda: candidate.without(barred, gap)
 
     def _alike(self, possible: Sequence[OptionCombination], *, between: bool) -> float:
         """What one grade for all costs, with the options for which that is least."""

@@ -150,6 +150,13 @@ class DesignSpace:
         return self.chosen([0] * len(self.ties))
 
     @cached_property
+    def kind_of(self) -> Indices:
+        """(x,) number of the grade of each column among all grades of all rows of the file."""
+        first = np.cumsum([0, *(len(row.grades) for row in self.rows)])
+        row_of = np.array([tie.row for tie in self.ties], np.intp)
+        return np.asarray(first[row_of[self.tie_of]] + self.grade_of, np.intp)
+
+    @cached_property
     def columns_of_coarsest(self) -> Indices:
         """(n_tie,) the columns with everything at its coarsest, which cost least."""
         return self.columns([self._n(tie) - 1 for tie in range(len(self.ties))])

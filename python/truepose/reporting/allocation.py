@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
 from truepose.design.cost_curve import options_text
-from truepose.design.result import THESE_POSES
+from truepose.design.result import REGION, THESE_POSES
 from truepose.files.wording import counted
 from truepose.reporting.display import column, pose_text
 from truepose.reporting.table import Table
@@ -16,6 +16,9 @@ from truepose.verdict.answer import BEFORE
 if TYPE_CHECKING:
     from truepose.design.cost_curve import CostCurve
     from truepose.design.result import Allocation, ChosenGrade
+
+MOST_DIFFERS = 4
+"""Differences of another design that are shown."""
 
 MOST_WORST = 8
 """Worst poses that are shown; the data have all that are kept."""
@@ -27,6 +30,8 @@ def tables(result: Allocation) -> Iterator[Table]:
         yield options(result)
     if result.grades:
         yield grades(result)
+    if result.alternatives:
+        yield alternatives(result)
     yield contributions(result)
     yield worst_poses(result)
 
@@ -72,6 +77,24 @@ def grades(result: Allocation) -> Table:
     )
 
 
+def alternatives(result: Allocation) -> Table:
+    """Other designs, and what they cost."""
+    return Table(
+        "alternatives",
+        "Other designs",
+        ("in what it differs", _header("cost", result.unit)),
+        tuple((_few(one.differs), f"{one.cost:.6g}") for one in result.alternatives),
+    )
+
+
+def _few(differs: Sequence[str]) -> str:
+    """The first of them, and how many more there are."""
+    shown = list(differs[:MOST_DIFFERS])
+    if len(differs) > MOST_DIFFERS:
+        shown.append(f"and {counted(len(differs) - MOST_DIFFERS, 'grade')} more")
+    return "; ".join(shown)
+
+
 def contributions(result: Allocation) -> Table:
     """What the worst error is made of, as filed and designed."""
     units = result.machine.shown
@@ -93,7 +116,10 @@ def contributions(result: Allocation) -> Table:
         "What the largest error is made of",
         tuple(header),
         tuple(zip([*names, "together"], *columns, strict=True)),
-        note="To first order, along the largest error at the worst pose of each.",
+        note="To first order, along the largest error at the worst pose of each."
+        if result.kept is None
+        else "What the mean error does, and of the rest the parts of the variance, at the worst "
+        "pose of each.",
     )
 
 
@@ -113,28 +139,41 @@ def worst_poses(result: Allocation) -> Table:
         tuple(rows),
         words=3,
         note="The largest error found there, solved exactly; the limit is the target less the "
-        "reserve.",
+        "reserve."
+        if result.kept is None
+        else "The error that the share asked of the machines drawn there is within; the limit is "
+        "the target less the reserve.",
     )
 
 
 def sentences(result: Allocation) -> Iterator[str]:
     """What the allocation comes to."""
-    yield (
-        f"Cost {money(result, result.cost)}; at least {money(result, result.lower_bound)} by the "
-        f"linear model at the target less {100.0 * result.reserve:.3g} %, so that the gap is "
-        f"{_percent(result.gap)} %."
-    )
+    if result.kept is None:
+        yield (
+            f"Cost {money(result, result.cost)}; at least {money(result, result.lower_bound)} by "
+            f"the linear model at the target less {100.0 * result.reserve:.3g} %, so that the gap "
+            f"is {_percent(result.gap)} %."
+        )
+    else:
+        yield f"Cost {money(result, result.cost)}; no bound is claimed for a share of all machines."
     units = result.machine.shown
     for kind, target in result.targets.items():
         unit = units.error(kind)
         largest = max(
             (one.error for one in result.worst_poses if one.quantity == kind), default=0.0
         )
+        size = f"{largest * unit.per_si:.4g} {unit.label}"
         yield (
-            f"The {kind} {_when(result)} is within {target * unit.per_si:.4g} {unit.label}: the "
-            f"largest error found is {largest * unit.per_si:.4g} {unit.label}"
+            f"The {kind} {_when(result)} is within {target * unit.per_si:.4g} {unit.label}: "
+            + (
+                f"the largest error found is {size}"
+                if result.share is None
+                else f"at the worst pose {100.0 * result.share:.6g} % of the machines are within "
+                f"{size}"
+            )
             + (f", in {counted(len(result.cases), 'condition')}." if len(result.cases) > 1 else ".")
         )
+    yield from _shares(result)
     if isfinite(result.one_grade):
         at_grade, at_width = money(result, result.one_grade), money(result, result.one_width)
         yield (
@@ -144,12 +183,18 @@ def sentences(result: Allocation) -> Iterator[str]:
     saved = sum(one.price for one in result.worst_poses) / 100.0
     if saved > 0.0:
         yield f"Targets 1 % wider would save some {money(result, saved)}, between grades."
-    if result.proven == THESE_POSES:
+    if result.region_proof is not None and result.proven != REGION:
+        yield f"All over the box nothing is proven: {result.region_proof.why}."
+    if result.proven == REGION:
+        assert result.region_proof is not None
+        boxes = counted(result.region_proof.boxes, "part")
+        yield f"Region proven: at every pose of the box, in {boxes}."
+    elif result.proven == THESE_POSES:
         yield (
             f"Proven at the {counted(result.poses_proven, 'worst pose')} found; between poses it "
             "is searched, not proven."
         )
-    else:
+    elif result.kept is None:
         yield "Not proven; `truepose check` says what is found and what is known."
     if result.impossible:
         yield (
@@ -158,6 +203,26 @@ def sentences(result: Allocation) -> Iterator[str]:
         )
     if result.left_out:
         yield f"{counted(result.left_out, 'pose')} looked at cannot be taken, and do not count."
+
+
+def _shares(result: Allocation) -> Iterator[str]:
+    """Which share of the machines keeps the targets, where that was asked."""
+    kept = result.kept
+    if kept is None:
+        return
+    at_one, at_all = (
+        f"{100.0 * share:.2f} % (standard error {100.0 * error:.2f} %)"
+        for share, error in (
+            (kept.each_pose, kept.each_pose_error),
+            (kept.all_poses, kept.all_poses_error),
+        )
+    )
+    asked = "at all poses" if result.all_poses else "at each pose"
+    yield (
+        f"Of machines drawn anew {at_one} are within the targets at the worst pose, {at_all} at "
+        f"all of {counted(kept.poses, 'pose')} at once; asked were "
+        f"{100.0 * (result.share or 0.0):g} % {asked}."
+    )
 
 
 def curve(result: CostCurve) -> Table:
@@ -177,7 +242,7 @@ def curve(result: CostCurve) -> Table:
             (
                 f"{point.target * unit.per_si:.6g}",
                 f"{point.cost:.6g}" if isfinite(point.cost) else "out of reach",
-                f"{point.lower_bound:.6g}" if isfinite(point.cost) else "",
+                f"{point.lower_bound:.6g}" if isfinite(point.lower_bound) else "",
                 options_text(point),
             )
             for point in result.points

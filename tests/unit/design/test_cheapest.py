@@ -9,51 +9,8 @@ import numpy as np
 import pytest
 
 import truepose as tp
+from costed_slider import COSTS, LENGTHS, OFFSETS, ROWS, errors
 from designs import file_with, row
-
-# The machine of machines/planar_two_slider.toml, in mm, N and K.
-RAILS = np.array([0.0, 600.0])
-ROD, AREA, MODULUS, EXPANSION, WARMER = 500.0, 28.2743338823, 210e3, 1.1e-5, 15.0
-FORCE = np.array([1200.0, -1500.0])
-
-LENGTHS, OFFSETS = (0.02, 0.05, 0.1), (0.01, 0.03, 0.08)
-ROWS = (
-    row("strut.*.length", bands='["20 um", "50 um", "100 um"]', cost=9.0),
-    row("drive.*.offset", bands='["10 um", "30 um", "80 um"]', cost=5.0),
-)
-COSTS = [[9.0 * 0.01 / half for half in LENGTHS], [5.0 * 0.01 / half for half in OFFSETS]]
-
-
-def tool(carriage: np.ndarray, rod: np.ndarray) -> np.ndarray:
-    """(..., 2) where two rods (..., 2) on carriages of heights (..., 2) meet, below them."""
-    across, up = RAILS[1] - RAILS[0], carriage[..., 1] - carriage[..., 0]
-    apart = np.hypot(across, up)
-    along = (rod[..., 0] ** 2 - rod[..., 1] ** 2 + apart**2) / (2.0 * apart)
-    off = np.sqrt(rod[..., 0] ** 2 - along**2)
-    x = RAILS[0] + (along * across + off * up) / apart
-    y = carriage[..., 0] + (along * up - off * across) / apart
-    return np.stack([x, y], axis=-1)
-
-
-def errors(pose: np.ndarray, rod: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """(..., 2) the error at poses (..., 2): rods that deviate by so much, carriages off by so much.
-
-    Besides, the rods are warm, and stretched by the force on the tool.
-    """
-    height = pose[..., 1:] + np.sqrt(ROD**2 - (pose[..., :1] - RAILS) ** 2)
-    run = (pose[..., :1] - RAILS) / ROD
-    rise = (pose[..., 1:] - height) / ROD
-    # What the rods pull the tool with is in balance with the force on it.
-    turned = run[..., 0] * rise[..., 1] - run[..., 1] * rise[..., 0]
-    tension = np.stack(
-        [
-            (FORCE[0] * rise[..., 1] - FORCE[1] * run[..., 1]) / turned,
-            (FORCE[1] * run[..., 0] - FORCE[0] * rise[..., 0]) / turned,
-        ],
-        axis=-1,
-    )
-    grown = ROD * EXPANSION * WARMER + tension * ROD / (MODULUS * AREA)
-    return tool(height + offset, ROD + grown + rod) - pose
 
 
 def largest(rod: tuple[float, ...], offset: tuple[float, ...], poses: np.ndarray) -> float:
@@ -175,3 +132,78 @@ options = [
         "invar" if alone.cost + 3.0 < min(dear) else "steel"
     ]
     assert fine.combinations == 2
+
+
+def test_of_the_designs_within_the_gap_one_of_fewer_grades(
+    file: Path, enumerated: list[tuple[float, float, tuple[int, ...]]]
+) -> None:
+    """What the gap allows is used for fewer different grades, and for nothing else."""
+    gap, fewer = 0.25, 0
+    for target in (0.385, 0.40, 0.42, 0.45):
+        limit = 0.99 * target
+        allowed = [(cost, grades) for error, cost, grades in enumerated if error <= limit]
+        cheapest = min(cost for cost, _ in allowed)
+
+        def kinds(grades: tuple[int, ...]) -> int:
+            return len(set(grades[:2])) + len(set(grades[2:]))
+
+        machine = tp.load(file, [f"accuracy.target={target}"])
+        found = tp.allocate(machine, gap=gap)
+        exactly = tp.allocate(machine, gap=0.0)
+        assert exactly.cost == pytest.approx(cheapest)
+        assert found.gap <= gap + 1e-9
+        # The bound told may be lower than the cheapest: at least what that leaves is used.
+        within = [grades for cost, grades in allowed if cost <= cheapest * (1.0 + 1e-9)]
+        assert found.distinct_grades <= min(kinds(grades) for grades in within)
+        beyond = [grades for cost, grades in allowed if cost <= found.lower_bound / (1.0 - gap)]
+        assert found.distinct_grades == min(kinds(grades) for grades in beyond)
+        assert found.proven == "these poses"
+        fewer += found.distinct_grades < exactly.distinct_grades
+    assert fewer > 0
+
+
+def test_other_designs_are_the_next_cheapest(tmp_path: Path) -> None:
+    """Of other rods, and of another grade for both rods together; each by itself, by hand."""
+    rows = (
+        row("strut.*.length", "kind", '["20 um", "50 um", "100 um"]', 9.0),
+        row("drive.*.offset", bands='["10 um", "30 um", "80 um"]', cost=5.0),
+    )
+    invar = "expansion=1.2e-6 1/K"
+    choice = """[[cost.choice]]
+name = "rods"
+of = "strut.*"
+options = [
+  { name = "steel", set = {}, cost = 0 },
+  { name = "invar", set = { expansion = "1.2e-6 1/K" }, cost = 3 },
+]
+"""
+    path = file_with(tmp_path, "planar_two_slider", choice, rows=rows)
+    target = "accuracy.target=0.42"
+    found = tp.allocate(tp.load(path, [target]), gap=0.0, alternatives=2)
+    assert len(found.alternatives) == 2
+    costs = [one.cost for one in found.alternatives]
+    assert found.cost <= costs[0] <= costs[1]
+    grade = next(one.grade for one in found.grades if one.of == "strut.*.length")
+    other_grades = [one for one in ("20 um", "50 um", "100 um") if one != grade]
+    steel = found.options[0].option == "steel"
+
+    def cheapest(rods: str, *settings: str) -> float:
+        bands = f'["{rods}"]'
+        alone = file_with(
+            tmp_path,
+            "planar_two_slider",
+            rows=(row("strut.*.length", "kind", bands, 9.0), rows[1]),
+        )
+        try:
+            return tp.allocate(tp.load(alone, [target, *settings]), gap=0.0).cost
+        except tp.RequestError:
+            return float("inf")
+
+    own = [] if steel else [f"strut.*.{invar}"]
+    other = [f"strut.*.{invar}"] if steel else []
+    of_other = min(cheapest(one, *other) for one in (grade, *other_grades)) + 3.0 * steel
+    of_grade = min(cheapest(one, *own) for one in other_grades) + 3.0 * (not steel)
+    assert costs == pytest.approx(sorted([of_other, of_grade]))
+    assert all(one.differs for one in found.alternatives)
+    assert any(text.startswith("rods: ") for one in found.alternatives for text in one.differs)
+    assert list(found.dataset["alternative_cost"].values) == pytest.approx(costs)

@@ -3,7 +3,8 @@
 An error over time has one row for each moment and pose, with the temperatures of the moment; shares
 of the variance one for each pose and parameter, then one for each source; bounds over a region one
 for each component and magnitude, a calibration one for each unknown, a circular test one for each
-quantity and for each angle.
+quantity and for each angle, an allocation one for each parameter that gets a tolerance, its curve
+one for each target.
 
 Where there are sources, a further row of the source "overall" has what all do together. Poses
 that cannot be used have one row with their status and nothing else. What is not over poses (the
@@ -46,6 +47,9 @@ class CsvColumn:
 def text(result: Result) -> Iterator[str]:
     """The file in pieces of some thousand rows."""
     sizes = result.dataset.sizes
+    if result.command == "allocate":
+        yield from _curve(result) if "target" in sizes else _allocated(result)
+        return
     if "unknown" in sizes:
         from truepose.reporting import calibration
 
@@ -117,6 +121,28 @@ def _over_time(result: Result) -> Iterator[str]:
                 for where, row in zip(at, errors.tolist(), strict=True)
             ]
         )
+
+
+def _allocated(result: Result) -> Iterator[str]:
+    """One row for each parameter that gets a tolerance: its half width, tie, grade and row."""
+    half, ties = result.values("half"), result.labels("tie")
+    yield _lines([["feature", "half", "unit", "tie", "grade", "tie_of"]])
+    grades, rows = result.labels("grade"), result.labels("tie_of")
+    for number, (feature, tie) in enumerate(
+        zip(result.labels("feature"), result.labels("feature_tie"), strict=True)
+    ):
+        at = ties.index(tie)
+        size = _cell(float(half.array[number]))
+        yield _lines([[feature, size, half.unit(number), tie, grades[at], rows[at]]])
+
+
+def _curve(result: Result) -> Iterator[str]:
+    """One row for each target: what the design costs, and what none can undercut."""
+    columns = [_single(result, name) for name in ("target", "cost", "lower_bound")]
+    yield _lines([[*(column.header for column in columns), "options"]])
+    for number, options in enumerate(result.labels("options")):
+        cells = [_cell(float(column.values[number])) for column in columns]
+        yield _lines([[*cells, options]])
 
 
 def _interleaved(

@@ -17,7 +17,7 @@ Blocks = Iterator[tuple[int, Arrays]]
 """The number and the arrays of each block, in any order."""
 
 
-class Evaluator(Protocol):
+class BlockEvaluator(Protocol):
     """What evaluates tasks."""
 
     def begun_with(self) -> str:
@@ -35,7 +35,7 @@ class Local:
         return instruction_set()
 
     def evaluate(self, tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
-        """As `Evaluator`."""
+        """As `BlockEvaluator`."""
         for task in tasks:
             yield task.number, evaluate_block(task, lambda _: told(1))
 
@@ -61,7 +61,7 @@ class OnCluster:
         return self._connected().begun_with()
 
     def evaluate(self, tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
-        """As `Evaluator`. Raises `RequestError` as `hand_out.results`."""
+        """As `BlockEvaluator`. Raises `RequestError` as `hand_out.results`."""
         from truepose.cluster.hand_out import results
 
         first = next(tasks, None)
@@ -82,7 +82,9 @@ class OnCluster:
 
 
 @contextmanager
-def evaluator_of(options: ClusterOptions | None, told: Told | None = None) -> Iterator[Evaluator]:
+def evaluator_of(
+    options: ClusterOptions | None, told: Told | None = None
+) -> Iterator[BlockEvaluator]:
     """The evaluator that was asked for; `told`: by default a warning of Python."""
     if options is None:
         yield Local()
@@ -97,4 +99,4 @@ def _warned(text: str) -> None:
     warnings.warn(text, stacklevel=2)
 
 
-__all__ = ["Evaluator", "Local", "OnCluster", "evaluator_of"]
+__all__ = ["BlockEvaluator", "Local", "OnCluster", "evaluator_of"]

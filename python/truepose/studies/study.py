@@ -29,7 +29,7 @@ from truepose.studies.block import (
 )
 from truepose.studies.dataset import DONE, done_variable, labels_of, results_of
 from truepose.studies.design import FACTORIAL
-from truepose.studies.evaluators import Evaluator, Local, evaluator_of
+from truepose.studies.evaluators import BlockEvaluator, Local, evaluator_of
 from truepose.studies.lock import only_writer
 from truepose.studies.plan import StudyPlan, plan_of, try_values
 from truepose.studies.quantities import QUICK_NAMES, chosen
@@ -262,7 +262,7 @@ def run(
     prepared: PreparedStudy,
     path: Path | None = None,
     *,
-    evaluator: Evaluator | None = None,
+    evaluator: BlockEvaluator | None = None,
     progress: Progress | None = None,
     going_on: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
@@ -286,7 +286,7 @@ def run(
         return _evaluated(prepared, plan, store, evaluator, progress)
 
 
-def _store(prepared: PreparedStudy, path: Path, evaluator: Evaluator) -> StudyStore:
+def _store(prepared: PreparedStudy, path: Path, evaluator: BlockEvaluator) -> StudyStore:
     """The store at `path` that goes on, or a new one. Raises `RequestError` (other-study)."""
     if path.exists():
         store = StudyStore(path)
@@ -361,7 +361,7 @@ def _evaluated(
     prepared: PreparedStudy,
     plan: StudyPlan,
     store: StudyStore | _InMemory,
-    evaluator: Evaluator,
+    evaluator: BlockEvaluator,
     progress: Progress | None,
 ) -> xr.Dataset:
     """Evaluate the blocks that are not done, and read what there is then."""

@@ -173,6 +173,11 @@ CATALOGUE: dict[str, str] = {
     "study-too-large": "a study of more variants than are allowed",
     "other-study": "a store that holds another study than the one that is asked for",
     "store-in-use": "a store of a study that another process writes to",
+    # workers
+    "bad-workers": "workers that cannot be asked for so",
+    "no-scheduler": "a scheduler of workers that does not answer, or no more",
+    "no-worker": "no worker is there that may compute",
+    "worker-lost": "workers that are lost at their tasks again and again",
     # controllers
     "unknown-controller": "a controller that there is no adapter for",
     "bad-option": "an option of a controller's adapter that it does not have or cannot read",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from truepose.cli import _complete
+from truepose.cli._cluster import cluster_options
 from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     OutputFile,
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
         help="Write the results into a store (Zarr 3), block by block. The same command goes on "
         "with one that is not finished.",
     ),
+    *cluster_options,
     click.option(
         "--report",
         "report_file",
@@ -105,6 +107,9 @@ def command(
     seed: int,
     quantities: str | None,
     reach: str,
+    workers: int | None,
+    scheduler: str | None,
+    tls: Path | None,
     dry_run: bool,
     report_file: Path | None,
     **options: Any,
@@ -116,13 +121,17 @@ def command(
     is done stands in the store; after Ctrl-C (exit code 130), or however the program ended, the
     same command goes on.
     """
+    from truepose.cli._cluster import told
     from truepose.cli._progress import progress, waiting
     from truepose.cli._steps import note_written
     from truepose.cli._verbose import say_machine, say_result
+    from truepose.cluster.options import requested_cluster
     from truepose.files.wording import counted
     from truepose.studies import study as studies
+    from truepose.studies.evaluators import evaluator_of
     from truepose.studies.quantities import QUICK_NAMES
 
+    cluster = requested_cluster(workers, scheduler, tls)
     request = Request(**options)
     output = request.output
     if (output is None) is not dry_run:
@@ -161,8 +170,10 @@ def command(
             f"{output}: {done:,} of {counted(total, 'variant')} are done, going on", err=True
         )
 
-    with progress("study", "variants") as report:
-        result = studies.run(prepared, output, progress=report, going_on=going_on)
+    with evaluator_of(cluster, told) as evaluator, progress("study", "variants") as report:
+        result = studies.run(
+            prepared, output, evaluator=evaluator, progress=report, going_on=going_on
+        )
     say_result(result)
     done, total = int(result["done"].sum()), result.sizes["variant"]
     if result.attrs["interrupted"]:

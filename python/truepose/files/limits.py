@@ -41,6 +41,9 @@ MOST_TURNS = 1000
 MOST_THREADS = 1024
 """Threads that share the work, however many are asked for."""
 
+MOST_WORKERS = 1024
+"""Processes on this computer that share the work."""
+
 MOST_SAMPLES = 10**9
 """Samples at one pose."""
 

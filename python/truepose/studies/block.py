@@ -7,13 +7,12 @@ that the study was planned with: the numbers are the same to the last bit.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from truepose._kernel import instruction_set, use_instruction_set
+from truepose.cluster.instruction_sets import computing_with
 from truepose.errors import PoseError, Problem, RequestError, TrueposeError
 from truepose.files.wording import counted
 from truepose.machine import Machine
@@ -103,8 +102,8 @@ def empty_arrays(names: tuple[str, ...], components: tuple[str, ...], count: int
 def evaluate_block(task: BlockTask, told: Callable[[int], None] | None = None) -> Arrays:
     """Every variable of `schema_of` for the variants of a block, (n_variant, ...), SI.
 
-    The same from the same task wherever it runs. `told` is called with how many are done. Raises
-    `ValueError` where this processor has not the instruction set of the task.
+    The same from the same task wherever it runs. `told` is called with how many are done. Raises as
+    `computing_with`.
     """
     arrays = empty_arrays(task.quantities, task.base.components, len(task.variants))
     with computing_with(task.instruction_set):
@@ -116,15 +115,9 @@ def evaluate_block(task: BlockTask, told: Callable[[int], None] | None = None) -
     return arrays
 
 
-@contextmanager
-def computing_with(name: str) -> Iterator[None]:
-    """Let the kernel run on an instruction set inside. Raises `ValueError` where it cannot."""
-    before = instruction_set()
-    use_instruction_set(name)
-    try:
-        yield
-    finally:
-        use_instruction_set(before)
+def evaluate_part(shared: BlockTask, variants: tuple[tuple[str, ...], ...]) -> Arrays:
+    """The same of a task that is sent in two parts: what all have, and its own variants."""
+    return evaluate_block(replace(shared, variants=variants))
 
 
 def evaluate_variant(task: BlockTask, settings: tuple[str, ...]) -> dict[str, Any]:
@@ -209,8 +202,8 @@ __all__ = [
     "STATUS",
     "Arrays",
     "BlockTask",
-    "computing_with",
     "empty_arrays",
     "evaluate_block",
+    "evaluate_part",
     "schema_of",
 ]

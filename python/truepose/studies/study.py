@@ -13,6 +13,8 @@ import numpy as np
 
 from truepose._kernel import instruction_set
 from truepose.arrays import Flags, Indices
+from truepose.cluster.instruction_sets import computing_with
+from truepose.cluster.options import requested_cluster
 from truepose.errors import Problem, RequestError
 from truepose.files.writing import require_own_place
 from truepose.machine import Machine
@@ -22,12 +24,12 @@ from truepose.studies.base_machine import BaseMachine, read_base
 from truepose.studies.block import (
     Arrays,
     BlockTask,
-    computing_with,
     empty_arrays,
     evaluate_block,
 )
 from truepose.studies.dataset import DONE, done_variable, labels_of, results_of
 from truepose.studies.design import FACTORIAL
+from truepose.studies.evaluators import BlockEvaluator, Local, evaluator_of
 from truepose.studies.lock import only_writer
 from truepose.studies.plan import StudyPlan, plan_of, try_values
 from truepose.studies.quantities import QUICK_NAMES, chosen
@@ -69,11 +71,6 @@ PARTS = {
     "truepose_version": "the version of truepose",
 }
 """What makes a study this one, and how it is called where another has another."""
-
-Blocks = Iterator[tuple[int, Arrays]]
-Evaluator = Callable[[Iterator[BlockTask], Callable[[int], None]], Blocks]
-"""What evaluates tasks: it gives the number and the arrays of each, in any order, and tells how
-many variants more are done."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +131,9 @@ def study(
     quantities: Sequence[str] = QUICK_NAMES,
     reach: float = 1.0,
     output: str | Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    tls: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Evaluate many variants of a machine file, at the poses of that file.
@@ -146,7 +146,10 @@ def study(
     `reach` of the poses of the base file is infeasible, and has no numbers.
 
     `output`: a store (.zarr) into which results are written block by block; the same call goes on
-    with one that is not finished. `progress` is called with (variants done, variants to be done).
+    with one that is not finished. `workers`: so many processes of this computer evaluate, or those
+    of the dask.distributed `scheduler` at "tcp://HOST:PORT", or "tls://HOST:PORT" and `tls`, a
+    folder with ca.pem, cert.pem and key.pem; the numbers are the same (docs/scale.md).
+    `progress` is called with (variants done, variants to be done).
     Ctrl-C ends the study with what is done; the attribute `interrupted` is 1 then.
 
     The Dataset, SI, over the dim variant: the plan (`setting`, `value`), `status` ("ok",
@@ -155,8 +158,9 @@ def study(
     Raises `MachineFileError` and `RequestError` as `truepose.load` does, and `RequestError`:
     bad-vary, bad-design, study-too-large, bad-seed, bad-reach, unknown-choice, no-workspace,
     no-pose-left, machine-file-changed, extra-missing, output-ending, output-not-writable,
-    output-exists, other-study, store-in-use.
+    output-exists, other-study, store-in-use, bad-workers, no-scheduler, no-worker, worker-lost.
     """
+    cluster = requested_cluster(workers, scheduler, tls)
     path = None if output is None else Path(output)
     if path is not None:
         require_store(path)
@@ -170,7 +174,8 @@ def study(
         quantities=quantities,
         reach=reach,
     )
-    return run(prepared, path, progress=progress)
+    with evaluator_of(cluster) as evaluator:
+        return run(prepared, path, evaluator=evaluator, progress=progress)
 
 
 def require_store(path: Path) -> None:
@@ -253,39 +258,35 @@ def _required_reach(reach: float) -> float:
     )
 
 
-def locally(tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
-    """Evaluate tasks one after the other in this process."""
-    for task in tasks:
-        yield task.number, evaluate_block(task, lambda _: told(1))
-
-
 def run(
     prepared: PreparedStudy,
     path: Path | None = None,
     *,
-    evaluator: Evaluator = locally,
+    evaluator: BlockEvaluator | None = None,
     progress: Progress | None = None,
     going_on: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Evaluate what is not done yet -> the Dataset of `study`.
 
-    `going_on` is called with how many variants of how many are done already, where any are.
+    `evaluator`: by default this process. `going_on` is called with how many variants of how many
+    are done already, where any are.
     """
+    evaluator = Local() if evaluator is None else evaluator
     if path is None:
         plan = prepared.plan()
-        kept = _InMemory(prepared, plan)
+        kept = _InMemory(prepared, plan, evaluator.begun_with())
         return _evaluated(prepared, plan, kept, evaluator, progress)
     with ExitStack() as stack:
         stack.enter_context(only_writer(path))
         sweep_beside(path)
-        store = _store(prepared, path)
+        store = _store(prepared, path, evaluator)
         plan, done = store.plan(), int(store.done().sum())
         if done and going_on is not None:
             going_on(done, len(plan))
         return _evaluated(prepared, plan, store, evaluator, progress)
 
 
-def _store(prepared: PreparedStudy, path: Path) -> StudyStore:
+def _store(prepared: PreparedStudy, path: Path, evaluator: BlockEvaluator) -> StudyStore:
     """The store at `path` that goes on, or a new one. Raises `RequestError` (other-study)."""
     if path.exists():
         store = StudyStore(path)
@@ -294,7 +295,7 @@ def _store(prepared: PreparedStudy, path: Path) -> StudyStore:
         return store
     plan = prepared.plan()
     block = block_of(len(plan))
-    key = {**prepared.key, "instruction_set": instruction_set()}
+    key = {**prepared.key, "instruction_set": evaluator.begun_with()}
     labels = labels_of(prepared.machine, plan, prepared.quantities, key, block)
     empty = empty_arrays(prepared.quantities, prepared.base.components, len(plan))
     return created(path, labels, results_of(prepared.machine, prepared.quantities, empty))
@@ -333,9 +334,9 @@ def block_of(count: int) -> int:
 class _InMemory:
     """What a study of no store has done: the same as `StudyStore`, of arrays."""
 
-    def __init__(self, prepared: PreparedStudy, plan: StudyPlan) -> None:
+    def __init__(self, prepared: PreparedStudy, plan: StudyPlan, instructions: str) -> None:
         self.block = block_of(len(plan))
-        self.key = {**prepared.key, "instruction_set": instruction_set()}
+        self.key = {**prepared.key, "instruction_set": instructions}
         self._prepared, self._plan = prepared, plan
         self._arrays = empty_arrays(prepared.quantities, prepared.base.components, len(plan))
         self._done = np.zeros(len(plan), np.bool_)
@@ -360,7 +361,7 @@ def _evaluated(
     prepared: PreparedStudy,
     plan: StudyPlan,
     store: StudyStore | _InMemory,
-    evaluator: Evaluator,
+    evaluator: BlockEvaluator,
     progress: Progress | None,
 ) -> xr.Dataset:
     """Evaluate the blocks that are not done, and read what there is then."""
@@ -378,7 +379,7 @@ def _evaluated(
 
     try:
         tasks = prepared.tasks(plan, numbers, store.block, instructions)
-        for number, arrays in evaluator(tasks, told):
+        for number, arrays in evaluator.evaluate(tasks, told):
             store.write(number, arrays)
     except KeyboardInterrupt:
         interrupted = True
@@ -395,7 +396,7 @@ def _usable(store: StudyStore | _InMemory) -> str:
     try:
         with computing_with(name):
             return name
-    except ValueError as failure:
+    except (RuntimeError, ValueError) as failure:
         raise RequestError(
             Problem(
                 "other-study",
@@ -442,7 +443,6 @@ __all__ = [
     "PreparedStudy",
     "StudyCost",
     "estimated",
-    "locally",
     "prepare",
     "require_store",
     "run",

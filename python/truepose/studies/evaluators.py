@@ -1,0 +1,102 @@
+"""Who evaluates the blocks of a study: this process, or the workers of a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from itertools import chain
+from typing import Protocol
+
+from truepose._kernel import instruction_set
+from truepose.cluster.options import ClusterOptions
+from truepose.cluster.workers import Told, Workers, connected
+from truepose.studies.block import Arrays, BlockTask, evaluate_block, evaluate_part
+
+Blocks = Iterator[tuple[int, Arrays]]
+"""The number and the arrays of each block, in any order."""
+
+
+class BlockEvaluator(Protocol):
+    """What evaluates tasks."""
+
+    def begun_with(self) -> str:
+        """The instruction set that a new study is begun with."""
+
+    def evaluate(self, tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
+        """Evaluate tasks of one study; `told` is called with how many variants more are done."""
+
+
+class Local:
+    """One block after the other in this process."""
+
+    def begun_with(self) -> str:
+        """The instruction set in use."""
+        return instruction_set()
+
+    def evaluate(self, tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
+        """As `BlockEvaluator`."""
+        for task in tasks:
+            yield task.number, evaluate_block(task, lambda _: told(1))
+
+
+class OnCluster:
+    """Whole blocks on workers, to which it connects when they are first needed."""
+
+    def __init__(self, options: ClusterOptions, told: Told, stack: ExitStack) -> None:
+        """`stack`: what ends the connection; `told`: called with who is given no work, and why."""
+        self._options, self._told, self._stack = options, told, stack
+        self._workers: Workers | None = None
+
+    def _connected(self) -> Workers:
+        if self._workers is None:
+            self._workers = self._stack.enter_context(connected(self._options, self._told))
+        return self._workers
+
+    def begun_with(self) -> str:
+        """The least instruction set that this process and the workers present have.
+
+        Raises `RequestError`: no-scheduler, no-worker.
+        """
+        return self._connected().begun_with()
+
+    def evaluate(self, tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
+        """As `BlockEvaluator`. Raises `RequestError` as `hand_out.results`."""
+        from truepose.cluster.hand_out import results
+
+        first = next(tasks, None)
+        if first is None:
+            return
+        shared = replace(first, variants=())
+        lengths: dict[int, int] = {}
+
+        def own() -> Iterator[tuple[int, tuple[tuple[str, ...], ...]]]:
+            for task in chain([first], tasks):
+                lengths[task.number] = len(task.variants)
+                yield task.number, task.variants
+
+        workers = self._connected()
+        for number, arrays in results(workers, evaluate_part, shared, own(), first.instruction_set):
+            yield number, arrays
+            told(lengths.pop(number))
+
+
+@contextmanager
+def evaluator_of(
+    options: ClusterOptions | None, told: Told | None = None
+) -> Iterator[BlockEvaluator]:
+    """The evaluator that was asked for; `told`: by default a warning of Python."""
+    if options is None:
+        yield Local()
+        return
+    with ExitStack() as stack:
+        yield OnCluster(options, _warned if told is None else told, stack)
+
+
+def _warned(text: str) -> None:
+    import warnings
+
+    warnings.warn(text, stacklevel=2)
+
+
+__all__ = ["BlockEvaluator", "Local", "OnCluster", "evaluator_of"]

@@ -13,6 +13,7 @@ import socket
 import sys
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -149,7 +150,11 @@ class Studio:
         self.session, self.access, self._state = session, access, state
         self._windows: dict[int, _Window] = {}
         self._next = 1
-        self._lock, self._reporting = asyncio.Lock(), asyncio.Lock()
+        self._lock = asyncio.Lock()
+        # Machines, texts and pages are made by one thread: malloc gives each an arena of its own,
+        # and several would each keep the most that they ever had. A report is waited for apart.
+        self._maker = ThreadPoolExecutor(1, "making")
+        self._reporter = ThreadPoolExecutor(1, "report")
         self._given: asyncio.Queue[Given] = asyncio.Queue()
         self._evaluation: Evaluator | None = None
         self._tasks: list[asyncio.Task[None]] = []
@@ -167,6 +172,7 @@ class Studio:
     async def begin(self) -> None:
         """Start the evaluation, and look after the file."""
         loop = asyncio.get_running_loop()
+        loop.set_default_executor(self._maker)
 
         def tell(given: Given) -> None:
             with suppress(RuntimeError):  # the loop is closed: the studio ends
@@ -205,18 +211,15 @@ class Studio:
         """The report of what is set now; one is made at a time."""
         async with self._lock:
             path, text = self.session.file.path, self.session.text
-        async with self._reporting:
-            try:
-                made = await asyncio.to_thread(
-                    by_itself,
-                    report_page.work,
-                    path,
-                    text,
-                    spoken().code,
-                    started=self._note_process,
-                )
-            except EOFError:  # ended by the system, for want of memory
-                made = ()
+        language = spoken().code
+
+        def make() -> Any:
+            return by_itself(report_page.work, path, text, language, started=self._note_process)
+
+        try:
+            made = await asyncio.get_running_loop().run_in_executor(self._reporter, make)
+        except EOFError:  # ended by the system, for want of memory
+            made = ()
         if not isinstance(made, str):
             problems = [problem.to_dict() for problem in made]
             return JSONResponse({"problems": problems}, UNPROCESSABLE, HEADERS)

@@ -52,6 +52,7 @@ class Workers:
         self.refused: dict[str, str] = {}
         self.lost: dict[str, str] = {}
         self._told = told
+        self._untold: list[str] = []
         self._asked: dict[str, Future] = {}
         self._required: str | None = None
         self._since = time.monotonic()
@@ -90,6 +91,7 @@ class Workers:
             if why:
                 del self.usable[address]
                 self._refuse(address, greeting.name, why)
+        self._tell()
 
     def look(self) -> list[str]:
         """Who is there -> addresses of those that may compute no more.
@@ -141,6 +143,7 @@ class Workers:
                 self._refuse(address, greeting.name, why)
             else:
                 self.usable[address] = greeting
+        self._tell()
 
     def _unfit(self, greeting: Greeting) -> str:
         """Why a worker may not compute, or nothing."""
@@ -162,8 +165,14 @@ class Workers:
     def _refuse(self, address: str, name: str | None, why: str) -> None:
         called = f"worker {address}" if name in (None, address) else f"worker {name} at {address}"
         self.refused[address] = f"{called}: {why}"
+        self._untold.append(self.refused[address])
+
+    def _tell(self) -> None:
+        """Name the refused, once there is one that may compute; an error names them otherwise."""
         if self.usable:
-            self._told(f"no work is given to {self.refused[address]}")
+            for said in self._untold:
+                self._told(f"no work is given to {said}")
+            self._untold.clear()
 
     def _none(self) -> RequestError:
         """The error where nobody may compute."""

@@ -12,6 +12,7 @@ import json
 import os
 import secrets
 import shutil
+import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
 ENDING = ".zarr"
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
+STILL_WRITTEN = 2.0
+"""s that the other writes of one that failed may take."""
+
 _PARTIAL = ".partial"
 """Ending of the files that Zarr has not written whole."""
 
@@ -211,8 +215,17 @@ def created(path: Path, labels: xr.Dataset, results: dict[str, xr.Variable]) -> 
     except OSError as failure:
         raise not_writable(path, failure, None) from failure
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        _remove(temporary)
     return StudyStore(path)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder, into which a failed write of Zarr's may still write for a moment."""
+    shutil.rmtree(folder, ignore_errors=True)
+    ends = time.monotonic() + STILL_WRITTEN
+    while folder.exists() and time.monotonic() < ends:
+        time.sleep(0.01)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _kind(variable: xr.Variable) -> type:

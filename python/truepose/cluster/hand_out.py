@@ -42,20 +42,17 @@ def results(
     shared: Any,
     tasks: Iterator[tuple[int, Any]],
     instructions: str,
-    *,
-    in_order: bool = False,
 ) -> Iterator[tuple[int, Any]]:
     """(number, `function(shared, own)`) of every task (number, own), computed by the workers.
 
-    As they come, or in the order of the tasks. Numbers are all different; `function` is one that a
-    worker can import. Raises `RequestError`: worker-lost, no-worker, no-scheduler, and what the
-    function raises.
+    As they come. Numbers are all different; `function` is one that a worker can import. Raises
+    `RequestError`: worker-lost, no-worker, no-scheduler, and what the function raises.
     """
     workers.require(instructions)
     workers.wait_for_one()
     handing = _HandingOut(workers, (function, shared), instructions)
     try:
-        yield from handing.ordered(tasks) if in_order else handing.run(tasks, None)
+        yield from handing.run(tasks)
     finally:
         handing.end()
 
@@ -84,31 +81,12 @@ class _HandingOut:
         self._ready: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
         self._looked = -LOOK
 
-    def ordered(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
-        """Results in the order of the tasks: those that came before their turn are kept here."""
-        order: deque[int] = deque()
-        early: dict[int, Any] = {}
-
-        def noted() -> Iterator[tuple[int, Any]]:
-            for number, own in tasks:
-                order.append(number)
-                yield number, own
-
-        for number, result in self.run(noted(), order):
-            early[number] = result
-            while order and order[0] in early:
-                first = order[0]
-                yield first, early.pop(first)
-                order.popleft()
-
-    def run(
-        self, tasks: Iterator[tuple[int, Any]], order: deque[int] | None
-    ) -> Iterator[tuple[int, Any]]:
-        """Results as they come; `order`: tasks that were begun and are not taken yet."""
+    def run(self, tasks: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
+        """Results as they come."""
         more = True
         while True:
             self._look()
-            more = self._give(tasks, order) and more
+            more = self._give(tasks) and more
             if not (self._under_way or self._again or more):
                 return
             for number, future in self._come():
@@ -127,19 +105,15 @@ class _HandingOut:
                 self._note_lost(self._names[address], address, numbers)
         self._looked = time.monotonic()
 
-    def _give(self, tasks: Iterator[tuple[int, Any]], order: deque[int] | None) -> bool:
+    def _give(self, tasks: Iterator[tuple[int, Any]]) -> bool:
         """Give every worker what it is short of -> whether there are more tasks."""
-        usable = self._workers.usable
-        most = None if order is None else 2 * AHEAD * max(1, len(usable))
         for depth in range(AHEAD):
-            for address in usable:
+            for address in self._workers.usable:
                 if len(self._doing[address]) > depth:
                     continue
                 if self._again:
                     number, own = self._again.popleft()
                 else:
-                    if most is not None and order is not None and len(order) >= most:
-                        return True
                     try:
                         number, argument = next(tasks)
                     except StopIteration:

@@ -155,11 +155,16 @@ class OptionCombination:
             solution = self._programme.whole(coefficients, most, gap, start if allowed else None)
             if solution is None:
                 return None
-            design = self._design(solution.x, self._judged(solution.x, self.judge.effort))
-            exceeding = design.judgement.exceeding
-            if not exceeding:
+            if design := self._kept(solution.x):
                 return design
-            self.cut(exceeding, design)
+        return None
+
+    def _kept(self, x: Floats) -> GradedDesign | None:
+        """The design of a solution if it is judged clean; it is cut off if not."""
+        design = self._design(x, self._judged(x, self.judge.effort))
+        if not design.judgement.exceeding:
+            return design
+        self.cut(design.judgement.exceeding, design)
         return None
 
     def cut(self, witnesses: Sequence[WorstPlace], design: GradedDesign) -> None:
@@ -200,11 +205,8 @@ class OptionCombination:
             solution = self._programme.plainest(coefficients, most, kinds, paid, start)
             if solution is None or len(np.unique(kinds[solution.x > 0.5])) >= fewest:
                 return None
-            design = self._design(solution.x, self._judged(solution.x, self.judge.effort))
-            exceeding = design.judgement.exceeding
-            if not exceeding:
+            if design := self._kept(solution.x):
                 return design
-            self.cut(exceeding, design)
         return None
 
     def bound_of_linear_model(self, gap: float) -> float:

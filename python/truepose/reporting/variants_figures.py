@@ -102,11 +102,9 @@ class _Axis:
     ticks: tuple[tuple[float, str], ...]
     is_number: bool
 
-    @property
-    def shares(self) -> Floats:
-        """(n,) from 0 at its lowest to 1 at its highest place."""
-        low, span = self.places.min(), float(np.ptp(self.places))
-        return np.full(self.places.size, 0.5) if span == 0.0 else (self.places - low) / span
+    def shares(self, places: Floats) -> Floats:
+        """(m,) of some places, 0 at its lowest and 1 at its highest; 0 where all are one."""
+        return np.asarray((places - self.places.min()) / (float(np.ptp(self.places)) or 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,7 +348,7 @@ def _parallel(variants: _Variants) -> Plot:
     axes = [*variants.axes, *errors]
     shown = variants.spread(MOST_LINES)
     figure = Plot()
-    heights = np.stack([axis.shares for axis in axes], axis=1)
+    heights = np.stack([axis.shares(axis.places) for axis in axes], axis=1)
     best = max(1, round(BEST_SHARE * shown.size))
     for name, chosen, line in (
         (say("others"), shown[best:], {"color": PALE, "width": 1}),
@@ -381,12 +379,12 @@ def _parallel(variants: _Variants) -> Plot:
         shapes.append(
             {"type": "line", "x0": at, "x1": at, "y0": 0, "y1": 1, "line": {"color": AXIS}}
         )
-        low, span = float(axis.places.min()), float(np.ptp(axis.places)) or 1.0
-        for place, word in axis.ticks:
+        ends = axis.shares(np.array([place for place, _ in axis.ticks]))
+        for share, (_, word) in zip(ends.tolist(), axis.ticks, strict=True):
             notes.append(
                 {
                     "x": at,
-                    "y": (place - low) / span,
+                    "y": share,
                     "text": word,
                     "showarrow": False,
                     "xanchor": "left" if at < len(axes) - 1 else "right",

@@ -62,9 +62,10 @@ web: cargo $(BUILDERS) ## build the kernel for pages, where Rust has its target:
 .PHONY: test
 test: test-rust test-python ## run the tests, of each sweep a member or a few: minutes
 
-# The CI has an hour: it does without the kernel's own tests on WebAssembly, which take minutes to compile.
+# The CI has an hour: it does without the kernel's own tests on WebAssembly, which take minutes to compile, and
+# without the members marked `long` of sweeps.
 .PHONY: test-all
-test-all: test-rust test-python-all $(if $(TRUEPOSE_CI),,test-wasi) ## run every test there is; the CI all but test-wasi
+test-all: test-rust test-python-all $(if $(TRUEPOSE_CI),,test-wasi) ## run every test there is; the CI all but test-wasi and what is marked long
 
 .PHONY: test-rust
 test-rust: cargo $(MADE) ## run the kernel's tests
@@ -85,7 +86,7 @@ test-python: package tools ## run the package's tests, of each sweep a member or
 
 .PHONY: test-python-all
 test-python-all: package tools ## run all of the package's tests, and write what they found for the site
-	$(PYTEST) --results=build/test-results.json
+	$(PYTEST) $(if $(TRUEPOSE_CI),-m "not long") --results=build/test-results.json
 
 # Needs chromium. How long, and by which numbers drawn at random: make soak MINUTES=10 SEED=2.
 MINUTES := 60

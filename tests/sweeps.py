@@ -2,7 +2,8 @@
 
 A sweep is one test that is run many times, for machines, seeds, instruments or flags. Its members
 with the marker `sweep` run in `make test-all` only. Of a law (tests/laws) every machine file keeps
-a member in `make test`, which laws/test_quick_members.py checks.
+a member in `make test`, which laws/test_quick_members.py checks. Members with the marker `long` too
+run in `make test-all`, but not in the CI, which has an hour.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 sweep = pytest.mark.sweep
+long = pytest.mark.long
 
 Member = tuple[str, str | None, bool]
 """A test with its file, the member's id in brackets or None, and whether it is marked `sweep`."""
@@ -41,6 +43,11 @@ def thinned(members: Iterable[Any], quick: Collection[Any] | None = None) -> lis
         else:
             found.append(pytest.param(member, marks=sweep))
     return found
+
+
+def long_member(*values: Any, id: str | None = None) -> Any:  # noqa: A002 the name that pytest has
+    """A member for `parametrize` that is left out of `make test` and of the CI."""
+    return pytest.param(*values, marks=(sweep, long), id=id)
 
 
 def one_a_machine(cases: Sequence[tuple[str, ...]]) -> set[tuple[str, ...]]:

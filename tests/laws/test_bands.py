@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from instruction_sets import SETS, computing_or_skipped
 from machine_under_test import OK, MachineUnderTest
-from truepose import _kernel
 from truepose.error_budget import propagation
 from truepose.error_budget.largest import largest
 from truepose.probability.domain import Domain
@@ -23,14 +23,6 @@ CLOSE = 5e-4
 """What that road may be too large by where all directions are nearly alike."""
 HALF = 1e-4
 """Half width of a band and standard deviation of a shift, of the parameter's unit."""
-INSTRUCTION_SETS = ("scalar", "portable", "avx2", "avx512")
-
-
-@pytest.fixture
-def restored() -> Iterator[None]:
-    """Whatever a test chose, the best instruction set comes back."""
-    yield
-    _kernel.use_instruction_set("best")
 
 
 def by_effects(
@@ -116,15 +108,12 @@ def test_one_call_says_what_the_effects_say(
             assert (np.abs(found - expected) <= AGREES * scale).all(), name
 
 
-@pytest.mark.usefixtures("restored")
-@pytest.mark.parametrize("name", INSTRUCTION_SETS)
+@pytest.mark.parametrize("name", SETS)
 def test_instruction_sets_agree(shipped: MachineUnderTest, name: str) -> None:
     best = {what: found for what, found, _ in both(shipped, True, True, True)}
-    try:
-        _kernel.use_instruction_set(name)
-    except _kernel.KernelError:
-        pytest.skip(f"this processor has no {name}")
-    for what, found, _ in both(shipped, True, True, True):
+    with computing_or_skipped(name):
+        again = list(both(shipped, True, True, True))
+    for what, found, _ in again:
         assert np.abs(found - best[what]).max() <= AGREES * np.abs(best[what]).max(), what
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from instruction_sets import SETS, computing_or_skipped
 from machine_under_test import OK, MachineUnderTest
 from random_machines import DrawnMachine
 from truepose import _kernel
@@ -16,7 +17,6 @@ from truepose import _kernel
 AGREES = 1e-12
 # One short of the lanes, as many, one more, and several blocks with a rest.
 SIZES = (1, 7, 8, 9, 37)
-INSTRUCTION_SETS = ("scalar", "portable", "avx2", "avx512")
 
 Results = dict[str, NDArray[np.float64]]
 
@@ -105,23 +105,18 @@ def test_a_bad_neighbour_changes_nothing(machine: MachineUnderTest, bad: str, fi
 
 @pytest.fixture
 def restored() -> Iterator[None]:
-    """Whatever a test chose, the best instruction set and the threads of before come back."""
+    """Whatever a test chose, the threads of before come back."""
     threads = _kernel.threads()
     yield
-    _kernel.use_instruction_set("best")
     _kernel.threads(threads)
 
 
-@pytest.mark.usefixtures("restored")
-@pytest.mark.parametrize("name", INSTRUCTION_SETS)
+@pytest.mark.parametrize("name", SETS)
 def test_instruction_sets_agree(machine: MachineUnderTest, name: str) -> None:
     best = everything(machine, machine.poses)
-    try:
-        _kernel.use_instruction_set(name)
-    except _kernel.KernelError:
-        pytest.skip(f"this processor has no {name}")
-    assert _kernel.instruction_set() == name
-    assert_agree(best, everything(machine, machine.poses))
+    with computing_or_skipped(name):
+        assert _kernel.instruction_set() == name
+        assert_agree(best, everything(machine, machine.poses))
 
 
 @pytest.mark.usefixtures("restored")

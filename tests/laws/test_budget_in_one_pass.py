@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import truepose as tp
+from instruction_sets import SETS, computing_or_skipped
 from machine_under_test import OK, MachineUnderTest
 from made_source import MadeSource, random_deviation, with_sources
-from truepose import _kernel
 from truepose.error_budget import in_kernel
 from truepose.error_budget.largest import lengths
 from truepose.machine import Machine
@@ -27,16 +25,8 @@ AGREES = 1e-11
 ROUNDING = 1e-14
 """and what poses are off by, m and rad: some roundings of one of half a metre, which a delta whose
 rods stand close to each other makes tens of."""
-INSTRUCTION_SETS = ("scalar", "portable", "avx2", "avx512")
 EACH = ("error", "error_lower", "error_upper", "worst", "reach", "uncertainty")
 ALL = ("overall_error", "overall_error_lower", "overall_error_upper")
-
-
-@pytest.fixture
-def restored() -> Iterator[None]:
-    """Whatever a test chose, the best instruction set comes back."""
-    yield
-    _kernel.use_instruction_set("best")
 
 
 def allowed(largest: Array, table: str) -> Array:
@@ -241,16 +231,12 @@ def test_one_pass_says_what_each_number_is_by_itself(
     Pass(machine, plain=plain).check()
 
 
-@pytest.mark.usefixtures("restored")
-@pytest.mark.parametrize("name", INSTRUCTION_SETS)
+@pytest.mark.parametrize("name", SETS)
 def test_instruction_sets_agree(shipped: MachineUnderTest, name: str) -> None:
     one = Pass(shipped, plain=True)
     best, _ = one.fill()
-    try:
-        _kernel.use_instruction_set(name)
-    except _kernel.KernelError:
-        pytest.skip(f"this processor has no {name}")
-    found, filled = one.fill()
+    with computing_or_skipped(name):
+        found, filled = one.fill()
     assert (filled.shifts == OK).all()
     assert (filled.bands == OK).all()
     for table in in_kernel.TABLES:

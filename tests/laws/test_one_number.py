@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from drive_kinds import has_majorant
+from instruction_sets import SETS, computing_or_skipped
 from machine_file import File, loaded
 from machine_under_test import MachineUnderTest
 from one_number import ROUNDING, Known, asking, drawn_inside, has_ends
@@ -37,8 +38,6 @@ ROUNDED = 1e-14
 """m and rad: what coordinates of about a metre are rounded to, on another way through."""
 ELLIPSOID = 5e-4
 """By how much a linear maximum may be too large, where a force's direction is not known."""
-
-INSTRUCTION_SETS = ["scalar", "portable", "avx2", "avx512"]
 
 
 # --- witness <= linear maximum + remainder <= bound; samples likewise
@@ -135,10 +134,9 @@ def test_a_pose_alone_is_the_same_as_among_others(shipped: MachineUnderTest) -> 
 
 @pytest.fixture
 def restored() -> Iterator[None]:
-    """Whatever a test chose, the best instruction set and the threads of before come back."""
+    """Whatever a test chose, the threads of before come back."""
     threads = _kernel.threads()
     yield
-    _kernel.use_instruction_set("best")
     _kernel.threads(threads)
 
 
@@ -151,15 +149,11 @@ def test_one_thread_and_two_give_the_same(shipped: MachineUnderTest) -> None:
     assert np.array_equal(*found)
 
 
-@pytest.mark.usefixtures("restored")
-@pytest.mark.parametrize("name", INSTRUCTION_SETS)
+@pytest.mark.parametrize("name", SETS)
 def test_instruction_sets_give_the_same(shipped: MachineUnderTest, name: str) -> None:
     best = surveyed(shipped.loaded, shipped.poses)
-    try:
-        _kernel.use_instruction_set(name)
-    except _kernel.KernelError:
-        pytest.skip(f"this processor has no {name}")
-    found = surveyed(shipped.loaded, shipped.poses)
+    with computing_or_skipped(name):
+        found = surveyed(shipped.loaded, shipped.poses)
     assert found == pytest.approx(best, rel=SAME, abs=ROUNDED)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from build_machine import MACHINES
+from instruction_sets import SETS, computing_or_skipped
 from machine_texts import PLANAR, edited, load_text
 from made_source import MadeSource, random_deviation, with_sources
 from truepose import _kernel
@@ -224,34 +225,23 @@ def test_samples_of_another_source_are_others() -> None:
 def restored() -> Iterator[None]:
     threads = _kernel.threads()
     yield
-    _kernel.use_instruction_set("best")
     _kernel.threads(threads)
 
 
-def chosen(name: str) -> None:
-    try:
-        _kernel.use_instruction_set(name)
-    except _kernel.KernelError:
-        pytest.skip(f"this processor has no {name}")
-
-
-SETS = ["scalar", "portable", "avx2", "avx512"]
-
-
-@pytest.mark.usefixtures("restored")
 @pytest.mark.parametrize("name", SETS)
 def test_every_instruction_set_draws_the_same(name: str) -> None:
     kinds = [*CONTINUOUS, TWO_POINT, LISTED, MEASURED, *[normal(2.5)] * 4]
     random = Random(Described((*kinds, UNIFORM, TRIANGULAR), None), SEED)
     linked = Random(Described((UNIFORM, normal(2.0)), matrix((0, 1, 0.5), count=2)), SEED)
     best = random.rows(0, 5000), linked.rows(0, 5000)
-    chosen(name)
-    found = random.rows(0, 5000)
+    with computing_or_skipped(name):
+        found = random.rows(0, 5000)
+        again = linked.rows(0, 5000)
     # A cosine is in these; a fused product and sum rounds once, two operations twice.
     rounded = [each.name in ("arcsine", "student-t") for each in random.distributions]
     assert np.array_equal(found[:, ~np.array(rounded)], best[0][:, ~np.array(rounded)])
     assert np.abs(found - best[0]).max() < 1e-15
-    assert np.array_equal(linked.rows(0, 5000), best[1])
+    assert np.array_equal(again, best[1])
 
 
 def of_file(name: str) -> Path:
@@ -432,14 +422,14 @@ def test_threads_give_the_same(name: str) -> None:
     assert np.array_equal(found[0].quantiles(shares), found[1].quantiles(shares))
 
 
-@pytest.mark.usefixtures("restored")
 @pytest.mark.parametrize("instructions", SETS)
 @pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "guided_body", "overconstrained"])
 def test_instruction_sets_give_the_same(name: str, instructions: str) -> None:
     of = studied(name)
     best = of.sampled(0, 3000)
-    chosen(instructions)
-    assert_same(of, of.sampled(0, 3000), best)
+    with computing_or_skipped(instructions):
+        found = of.sampled(0, 3000)
+    assert_same(of, found, best)
 
 
 def by_identity(of: Studied) -> dict[tuple[str, int], Array]:

@@ -7,6 +7,7 @@ the workspace, and not on the bed alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,8 @@ from numpy.typing import NDArray
 from printed_config import kinematics_of
 
 import truepose as tp
-from klipper_printer import LINEAR, ROTARY, as_saved, saved
-from sweeps import thinned
+from klipper_printer import LINEAR, ROTARY, Printer, as_saved, saved
+from sweeps import long_member, sweep, thinned
 from truepose.calibration.calibrate import Calibration
 from truepose.errors import MachineFileError
 
@@ -41,15 +42,16 @@ SEEDS = (1, 2, 3, 4, 5)
 
 @dataclass(frozen=True)
 class Compared:
-    """Where the nozzle goes, off where it was commanded, (n,) mm over the workspace."""
+    """Where the nozzle goes, off where it was commanded, (n,) mm over the workspace `points`."""
 
     held: Array
-    klipper: Array
     ours: Array
     calibration: Calibration
+    measured: str
+    points: Array
 
 
-def compared(name: str, seed: int, folder: Path) -> Compared:
+def ours(name: str, seed: int, folder: Path) -> Compared:
     held, true = TRUTHS[name]
     measured = saved(held, true, z_offset=0.15, noise=(0.005, 0.02), seed=seed)
     text = held.config() + as_saved(measured)
@@ -62,8 +64,26 @@ def compared(name: str, seed: int, folder: Path) -> Compared:
     ends = np.array([drive.travel[1] for drive in found.machine.drives])
     unit = 1.0 if held.turns else MM
     commanded = calibration.calibrated().inverse(points * MM)
-    ours = (ends - commanded) / (unit * held.step)
+    steps = (ends - commanded) / (unit * held.step)
+    return Compared(
+        off(true, points, np.array([held.steps(point) for point in points])),
+        off(true, points, steps),
+        calibration,
+        measured,
+        points,
+    )
 
+
+def off(true: Printer, points: Array, steps: Array) -> Array:
+    """(n,) mm from where it was commanded to where the tool is."""
+    places = np.array([true.tool(row) for row in steps])
+    distances: Array = np.linalg.norm(places - points, axis=1)
+    return distances
+
+
+def klippers(name: str, measured: str, points: Array) -> Array:
+    """Likewise with the numbers that Klipper finds, which searches in Python for many seconds."""
+    held, true = TRUTHS[name]
     config = kinematics_of(held.config() + measured, steps=True, measured=True)
     answer = klipper(config, [], extended=True).calibrated
     steppers = [answer[f"stepper_{letter}"] for letter in "abc"]
@@ -78,32 +98,42 @@ def compared(name: str, seed: int, folder: Path) -> Compared:
         numbers["arms"] = tuple(float(row["arm_length"]) for row in steppers)
     theirs = replace(held, **numbers)
 
-    def off(steps: Array) -> Array:
-        places = np.array([true.tool(row) for row in steps])
-        distances: Array = np.linalg.norm(places - points, axis=1)
-        return distances
-
-    return Compared(
-        off(np.array([held.steps(point) for point in points])),
-        off(np.array([theirs.steps(point) for point in points])),
-        off(ours),
-        calibration,
-    )
+    return off(true, points, np.array([theirs.steps(point) for point in points]))
 
 
 @pytest.mark.parametrize("seed", thinned(SEEDS))
 @pytest.mark.parametrize("name", thinned(TRUTHS))
 def test_what_is_stated_holds_of_the_machine(name: str, seed: int, tmp_path: Path) -> None:
     """The tool is where the calibrated machine says, within what the answer states of it."""
-    found = compared(name, seed, tmp_path)
+    found = ours(name, seed, tmp_path)
     assert found.calibration.accepted
     stated = found.calibration.gate.after.within[0] / MM
     assert found.ours.max() < stated
     assert found.ours.max() < 0.3 * found.held.max()
-    # A bed and distances on it leave Klipper's numbers free to be wrong above it; nothing in what
-    # it says tells. Of arms that are as drawn it takes them to be, and may be nearer.
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        ("linear", 1),
+        pytest.param("linear-other-pulleys", 2, marks=sweep),
+        *(
+            long_member(name, seed)
+            for name, seed in product(TRUTHS, SEEDS)
+            if (name, seed) not in (("linear", 1), ("linear-other-pulleys", 2))
+        ),
+    ],
+)
+def test_klippers_numbers_are_further_off(name: str, seed: int, tmp_path: Path) -> None:
+    """A bed and distances on it leave them free to be wrong above it; nothing it says tells.
+
+    Of arms that are as drawn Klipper takes them to be, and may be nearer.
+    """
+    found = ours(name, seed, tmp_path)
+    theirs = klippers(name, found.measured, found.points)
+    assert np.isfinite(theirs).all()
     if name.startswith("linear"):
-        assert rms(found.ours) < 0.5 * rms(found.klipper)
+        assert rms(found.ours) < 0.5 * rms(theirs)
 
 
 def rms(distances: Array) -> float:

@@ -13,12 +13,16 @@ from endurance import MACHINES, endure, require
 from endurance_plan import Plan, Subject
 from real_linuxcnc import required
 
-from sweeps import sweep
+from sweeps import long_member, sweep
 
 
 @pytest.mark.parametrize(
     ("machine", "seed", "seconds"),
-    [("planar_two_slider", 3, 5.0), pytest.param("hexapod", 4, 120.0, marks=sweep)],
+    [
+        ("planar_two_slider", 3, 5.0),
+        pytest.param("hexapod", 4, 20.0, marks=sweep),
+        long_member("hexapod", 4, 120.0),
+    ],
 )
 def test_random_work(machine: str, seed: int, seconds: float, tmp_path: Path) -> None:
     required()

@@ -2,7 +2,7 @@
 
 That is the same hash over all decoded arrays, coordinates and the plan. Moments are drawn from a
 seed: any moment of half a run, and moments within the milliseconds in which a block is written,
-which the command tells us. `make test` kills six times, `make test-all` twenty times more.
+which the command tells us. `make test` kills six times, `make test-all` elsewhere twenty times more.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from command_line import PLANAR
-from sweeps import thinned
+from sweeps import long_member
 from truepose.studies.lock import lock_file
 
 xr = pytest.importorskip("xarray")
@@ -118,7 +118,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
     return store, finished(store)
 
 
-@pytest.mark.parametrize("kills", thinned([6, 20]))
+@pytest.mark.parametrize("kills", [6, long_member(20)])
 def test_a_killed_study_goes_on_to_the_same_content(
     kills: int, undisturbed: tuple[Path, float], tmp_path: Path
 ) -> None:

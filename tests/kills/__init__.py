@@ -143,7 +143,7 @@ class Kills:
 
     def __init__(self, name: str, place: Path) -> None:
         self.name = name
-        self._place = place
+        self.place = place
         self._old, self._new = place / "old", place / "new"
         start = time.monotonic()
         self._written(self._old, ())
@@ -155,7 +155,7 @@ class Kills:
 
     def one(self, chance: random.Random, *, aimed: bool) -> Killed:
         """Kill it once, at a moment drawn from `chance`."""
-        folder = self._place / "folder"
+        folder = self.place / "folder"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(self._old, folder)
         if self.name in NEW:  # it writes over nothing
@@ -183,7 +183,7 @@ class Kills:
 
     def _state(self, name: str) -> str:
         """Which run a file is of, byte by byte."""
-        file = self._place / "folder" / name
+        file = self.place / "folder" / name
         if not file.exists():
             return "old" if self.name in NEW else "none"
         content = file.read_bytes()
@@ -196,7 +196,7 @@ class Kills:
         return self._content("old", name) != self._content("new", name)
 
     def _content(self, run: str, name: str) -> bytes:
-        return (self._place / run / name).read_bytes()
+        return (self.place / run / name).read_bytes()
 
     def _changes(self) -> tuple[str, ...]:
         return OTHERS.get(self.name, CHANGED)

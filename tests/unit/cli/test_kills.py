@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import random
 import shutil
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -21,11 +23,17 @@ KILLED = ["plan", "budget", "gcode", "export linuxcnc", "calibrate", "live"]
 """Twice each: at any moment, and while the files take their places."""
 
 
+@pytest.fixture(scope="module")
+def kills_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Kills]:
+    """Those of a command, whose two undisturbed runs are made once."""
+    return cache(lambda name: Kills(name, tmp_path_factory.mktemp("kills") / "place"))
+
+
 @pytest.mark.parametrize("name", thinned(KILLED))
-def test_killed_at_any_moment(name: str, tmp_path: Path) -> None:
+def test_killed_at_any_moment(name: str, kills_of: Callable[[str], Kills]) -> None:
     if name == "live" and not part.is_built():
         missing("the kernel for browsers is not built: make web")
-    kills = Kills(name, tmp_path)
+    kills = kills_of(name)
     chance = random.Random(name)  # noqa: S311
     for aimed in (False, True):
         killed = kills.one(chance, aimed=aimed)
@@ -33,13 +41,15 @@ def test_killed_at_any_moment(name: str, tmp_path: Path) -> None:
         assert killed.told or not killed.mixed, killed
 
 
-def test_a_mixed_export_says_that_it_is_one(tmp_path: Path) -> None:
-    kills = Kills("export linuxcnc", tmp_path)
-    folder = tmp_path / "folder"
-    shutil.copytree(tmp_path / "old", folder)
+def test_a_mixed_export_says_that_it_is_one(
+    kills_of: Callable[[str], Kills], tmp_path: Path
+) -> None:
+    kills = kills_of("export linuxcnc")
+    folder = tmp_path / "mixed"
+    shutil.copytree(kills.place / "old", folder)
     assert len(kills.hashes(folder)) == 1
     name = next(name for name in kills.names if name.endswith(".ini"))
-    shutil.copy(tmp_path / "new" / name, folder / name)
+    shutil.copy(kills.place / "new" / name, folder / name)
     assert len(kills.hashes(folder)) == 2
 
 

@@ -2,7 +2,7 @@
 
 That is the same hash over all decoded arrays, coordinates and the plan. Moments are drawn from a
 seed: any moment of half a run, and moments within the milliseconds in which a block is written,
-which the command tells us. `make test` kills six times, `make test-all` elsewhere twenty times more.
+which the command tells us. `make test` kills six times, all tests twenty times more.
 """
 
 from __future__ import annotations

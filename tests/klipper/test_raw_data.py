@@ -25,6 +25,9 @@ from truepose.errors import MachineFileError
 Array = NDArray[np.float64]
 MM = 1e-3
 
+pytestmark = pytest.mark.timeout(1800)
+"""Klipper's search may take minutes where others compute too."""
+
 BUILT_LINEAR = replace(
     LINEAR, radius=149.35, arms=(300.6, 300.45, 300.75), ends=(309.4, 309.9, 309.1),
     angles=(210.2, 329.75, 90.0),
@@ -52,6 +55,7 @@ class Compared:
 
 
 def ours(name: str, seed: int, folder: Path) -> Compared:
+    """The simulated printer measured, imported and calibrated here."""
     held, true = TRUTHS[name]
     measured = saved(held, true, z_offset=0.15, noise=(0.005, 0.02), seed=seed)
     text = held.config() + as_saved(measured)
@@ -97,7 +101,6 @@ def klippers(name: str, measured: str, points: Array) -> Array:
     else:
         numbers["arms"] = tuple(float(row["arm_length"]) for row in steppers)
     theirs = replace(held, **numbers)
-
     return off(true, points, np.array([theirs.steps(point) for point in points]))
 
 

@@ -14,13 +14,16 @@ from pathlib import Path
 import pytest
 
 from kills import COMMANDS, Kills
-from sweeps import thinned
+from sweeps import long_member, thinned
 from system_package import missing
 from truepose.cli import COMMANDS as ALL
 from truepose.reporting.live import part
 
-KILLED = ["plan", "budget", "gcode", "export linuxcnc", "calibrate", "live"]
-"""Twice each: at any moment, and while the files take their places."""
+KILLED = ["plan", "export linuxcnc", "calibrate"]
+"""Commands with several files, which may be mixed; twice each: at any moment, and while the files
+take their places."""
+FURTHER = ["budget", "gcode", "live"]
+"""Likewise, outside of the CI."""
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +32,7 @@ def kills_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Kills]
     return cache(lambda name: Kills(name, tmp_path_factory.mktemp("kills") / "place"))
 
 
-@pytest.mark.parametrize("name", thinned(KILLED))
+@pytest.mark.parametrize("name", [*thinned(KILLED), *map(long_member, FURTHER)])
 def test_killed_at_any_moment(name: str, kills_of: Callable[[str], Kills]) -> None:
     if name == "live" and not part.is_built():
         missing("the kernel for browsers is not built: make web")

@@ -8,6 +8,9 @@ from mutations.__main__ import failures, main, mutation
 from mutations.inputs import KINDS
 from sweeps import long_member, sweep
 
+pytestmark = pytest.mark.timeout(1800)
+"""Each file has a limit of its own, of the processor's time."""
+
 QUICK = 300
 """Of each kind; 2000 in the whole suite, of which these are the first."""
 

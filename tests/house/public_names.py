@@ -158,7 +158,7 @@ def functions() -> Iterator[str]:
         costs = tp.load(EXAMPLES / "data" / "hexapod_costs.toml")
         results = {
             "load": planar,
-            "allocate": tp.allocate(costs, gap=0.2),  # whose search ends soon
+            "allocate": tp.allocate(costs),
             "load().condition": warming.condition,
             "Input": tp.Input.normal(1.0, 0.1),
             "accuracy": tp.accuracy(planar),

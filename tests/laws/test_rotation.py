@@ -127,14 +127,14 @@ class Turned:
 
 
 @cache
-def turned_machine_of(machine: MachineUnderTest, envelope: Envelope) -> Turned:
-    """Without directions that are no vectors: of several laws."""
+def turned_without_axes(machine: MachineUnderTest, envelope: Envelope) -> Turned:
+    """Nothing is told along axes that a worst case or a sample would see."""
     return Turned(machine, undirected=False, envelope=envelope)
 
 
 @cache
 def turned_as_filed(machine: MachineUnderTest) -> Turned:
-    """Likewise, with all that the file says."""
+    """With guideways that lean either way."""
     return Turned(machine)
 
 
@@ -199,7 +199,7 @@ def spread_turns(machine: MachineUnderTest) -> None:
 
 def largest_error_has_no_axes(machine: MachineUnderTest) -> None:
     """The longest error vector, to first order and at a corner."""
-    case = turned_machine_of(machine, "none")
+    case = turned_without_axes(machine, "none")
     first = tp.worst_case(case.one, case.poses[:1])
     second = tp.worst_case(case.other, case.other_poses[:1])
     for name in ("magnitude_linear", "magnitude_exact"):
@@ -212,7 +212,7 @@ def a_force_of_any_direction_has_no_axes(machine: MachineUnderTest) -> None:
     Its direction may be looked for, so that a millionth is as good as equal; a box would be off by
     up to sqrt 3.
     """
-    case = turned_machine_of(machine, "one")
+    case = turned_without_axes(machine, "one")
     first = tp.worst_case(case.one, case.poses[:1]).magnitude_linear.values
     second = tp.worst_case(case.other, case.other_poses[:1]).magnitude_linear.values
     off = float(np.abs(second / first - 1.0).max())
@@ -221,7 +221,7 @@ def a_force_of_any_direction_has_no_axes(machine: MachineUnderTest) -> None:
 
 def samples_turn(machine: MachineUnderTest) -> None:
     """Sample by sample."""
-    case = turned_machine_of(machine, "none")
+    case = turned_without_axes(machine, "none")
     found = []
     for one, poses in ((case.one, case.poses), (case.other, case.other_poses)):
         found.append(tp.monte_carlo(one, poses[:1], SAMPLES, machine.seed))

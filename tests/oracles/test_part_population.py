@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,9 +30,11 @@ from part_simulator.errors import (
 from part_simulator.part_under_test import MACHINES, PartUnderTest, without_errors
 from part_simulator.questions import QUESTIONS
 from sweeps import long_member, sweep, thinned
+from truepose.workpiece import evaluate
 from truepose.workpiece.evaluate import evaluate_part
 from truepose.workpiece.evaluation import PartEvaluation
 from truepose.workpiece.samples import CHECKED, sampled
+from truepose.workpiece.states import BEFORE, PartState, part_states
 
 Floats = NDArray[np.float64]
 
@@ -52,9 +55,18 @@ def on(name: str, errors: tuple[Error, ...], folder: Path, *asked: str) -> PartU
     return PartUnderTest(name, file, folder, [BY_NAME[one] for one in asked])
 
 
+def as_commanded(*given: Any) -> tuple[tuple[PartState, ...], NDArray[np.intp]]:
+    """The states of a part without the one after compensation, at which nothing here looks."""
+    (before, _), status = part_states(*given)
+    assert before.name == BEFORE
+    return (before,), status
+
+
 def evaluated(under_test: PartUnderTest, samples: int = SAMPLES) -> PartEvaluation:
-    machine = under_test.machine
-    return evaluate_part(machine, under_test.read, machine.condition, samples=samples, seed=SEED)
+    machine, read = under_test.machine, under_test.read
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evaluate, "part_states", as_commanded)
+        return evaluate_part(machine, read, machine.condition, samples=samples, seed=SEED)
 
 
 # --- coverage

@@ -284,9 +284,10 @@ def headline(twin: Twin, answer: Answer) -> float:
     return float(first.max())
 
 
-def follow(drawn: DrawnSet) -> Followed | None:
-    """Of a refused set; None where the answer is yes at once."""
-    answer = answer_of(drawn.twin, drawn.write(), drawn.judged)
+def follow(drawn: DrawnSet, answer: Answer | None = None) -> Followed | None:
+    """Of a refused set; None where the answer is yes at once. `answer`: the first, if known."""
+    if answer is None:
+        answer = answer_of(drawn.twin, drawn.write(), drawn.judged)
     if answer.accepted:
         return None
     return Follower(drawn, random_of("follow", drawn.kind.name, drawn.seed)).followed(answer)

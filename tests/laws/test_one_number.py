@@ -10,6 +10,7 @@ import copy
 import dataclasses
 import math
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,12 +18,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import truepose as tp
+from drawn_sweeps import spread
 from drive_kinds import has_majorant
 from instruction_sets import SETS, computing_or_skipped
 from machine_file import File, loaded
 from machine_under_test import MachineUnderTest
 from one_number import ROUNDING, Known, asking, drawn_inside, has_ends
-from random_machines import DrawnMachine
+from random_machines import DRAWN, MORE, DrawnMachine
 from truepose import _kernel
 from truepose.error_budget.largest import largest
 from truepose.machine import Machine
@@ -40,11 +42,30 @@ ELLIPSOID = 5e-4
 """By how much a linear maximum may be too large, where a force's direction is not known."""
 
 
+@pytest.fixture(params=spread([*DRAWN, *MORE]), ids=lambda machine: f"drawn-{machine.name}")
+def drawn_of_200(request: pytest.FixtureRequest) -> DrawnMachine:
+    """One of 200 random machines, of which the CI takes some 25."""
+    found: DrawnMachine = request.param
+    return found
+
+
+@cache
+def known_of(shipped: MachineUnderTest) -> Known:
+    """At the poses of its file."""
+    return Known(shipped.loaded)
+
+
+@cache
+def known_at_poses(shipped: MachineUnderTest) -> Known:
+    """At those of the tests."""
+    return Known(shipped.loaded, shipped.poses)
+
+
 # --- witness <= linear maximum + remainder <= bound; samples likewise
 
 
-def what_is_found_is_within_what_is_proven(machine: Machine) -> None:
-    known = Known(machine)
+def what_is_found_is_within_what_is_proven(known: Known) -> None:
+    machine = known.machine
     for name in STATES:
         found = known.surveys[name]
         proven = np.isfinite(found.bound)
@@ -72,11 +93,11 @@ def what_is_found_is_within_what_is_proven(machine: Machine) -> None:
 
 
 def test_what_is_found_is_proven_of_machines_shipped(shipped: MachineUnderTest) -> None:
-    what_is_found_is_within_what_is_proven(shipped.loaded)
+    what_is_found_is_within_what_is_proven(known_of(shipped))
 
 
 def test_what_is_found_is_proven_of_machines_drawn(drawn_of_200: DrawnMachine) -> None:
-    what_is_found_is_within_what_is_proven(drawn_of_200.loaded)
+    what_is_found_is_within_what_is_proven(Known(drawn_of_200.loaded))
 
 
 # --- one number in all results
@@ -87,8 +108,8 @@ def linear_maxima(found: xr.Dataset, name: str) -> dict[int, Array]:
     return dict(zip(found["pose"].values.tolist(), found[name].values, strict=True))
 
 
-def it_has_one_number_in_all_results(machine: Machine, poses: Array) -> None:
-    known = Known(machine, poses)
+def it_has_one_number_in_all_results(known: Known, poses: Array) -> None:
+    machine = known.machine
     surveyed = {
         name: dict(zip(found.numbers.tolist(), found.linear, strict=True))
         for name, found in known.surveys.items()
@@ -107,16 +128,18 @@ def it_has_one_number_in_all_results(machine: Machine, poses: Array) -> None:
 def test_a_pose_has_one_number_in_all_results_of_machines_shipped(
     shipped: MachineUnderTest,
 ) -> None:
-    it_has_one_number_in_all_results(shipped.loaded, shipped.poses)
+    it_has_one_number_in_all_results(known_at_poses(shipped), shipped.poses)
 
 
 def test_a_pose_has_one_number_in_all_results_of_machines_drawn(drawn_of_200: DrawnMachine) -> None:
-    it_has_one_number_in_all_results(drawn_of_200.loaded, drawn_of_200.three_poses)
+    it_has_one_number_in_all_results(
+        Known(drawn_of_200.loaded, drawn_of_200.three_poses), drawn_of_200.three_poses
+    )
 
 
-def surveyed(machine: Machine, poses: Array) -> Array:
+def surveyed(known: Known) -> Array:
     """(n, state, quantity, 3) linear maximum, bound and witness, inf for none."""
-    found = Known(machine, poses).surveys
+    found = known.surveys
     return np.stack(
         [np.stack([each.linear, each.bound, each.witness], axis=-1) for each in found.values()],
         axis=1,
@@ -124,9 +147,9 @@ def surveyed(machine: Machine, poses: Array) -> Array:
 
 
 def test_a_pose_alone_is_the_same_as_among_others(shipped: MachineUnderTest) -> None:
-    together = surveyed(shipped.loaded, shipped.poses)
+    together = surveyed(known_at_poses(shipped))
     for row in (0, 16, 36):
-        alone = surveyed(shipped.loaded, shipped.poses[row])
+        alone = surveyed(Known(shipped.loaded, shipped.poses[row]))
         assert alone[0] == pytest.approx(together[row], rel=SAME, abs=ROUNDED)
         (first, *_) = tp.accuracy(asking(shipped.loaded), shipped.poses[row])
         assert first.linear.value == alone[0, 0, 0, 0]
@@ -145,22 +168,22 @@ def test_one_thread_and_two_give_the_same(shipped: MachineUnderTest) -> None:
     found = []
     for threads in (1, 2):
         _kernel.threads(threads)
-        found.append(surveyed(shipped.loaded, np.tile(shipped.poses, (10, 1))))
+        found.append(surveyed(Known(shipped.loaded, np.tile(shipped.poses, (10, 1)))))
     assert np.array_equal(*found)
 
 
 @pytest.mark.parametrize("name", SETS)
 def test_instruction_sets_give_the_same(shipped: MachineUnderTest, name: str) -> None:
-    best = surveyed(shipped.loaded, shipped.poses)
+    best = surveyed(known_at_poses(shipped))
     with computing_or_skipped(name):
-        found = surveyed(shipped.loaded, shipped.poses)
+        found = surveyed(Known(shipped.loaded, shipped.poses))
     assert found == pytest.approx(best, rel=SAME, abs=ROUNDED)
 
 
 # --- before and after are the same set
 
 
-def after_is_no_more_than_before(machine: Machine) -> None:
+def after_is_no_more_than_before(known: Known) -> None:
     """On commanded freedoms, for sets symmetric about what is compensated.
 
     There the errors are v + E t before and E' t after, t in the same set, which has -t with every
@@ -173,7 +196,7 @@ def after_is_no_more_than_before(machine: Machine) -> None:
     The last term is of the order of |v| h, what it adds to `before` of that of h^3, where |v| is
     as small as h^2: less than the remainder, h^2, which compensation states.
     """
-    known = Known(machine)
+    machine = known.machine
     before, after = (known.surveys[name] for name in STATES)
     assert np.array_equal(before.numbers, after.numbers)
     states = zip(known.population.states(BEFORE), known.population.states(AFTER), strict=True)
@@ -205,14 +228,14 @@ def after_is_no_more_than_before(machine: Machine) -> None:
 def test_compensation_adds_no_more_than_it_says_to_machines_shipped(
     shipped: MachineUnderTest,
 ) -> None:
-    after_is_no_more_than_before(shipped.loaded)
+    after_is_no_more_than_before(known_of(shipped))
 
 
 def test_compensation_adds_no_more_than_it_says_to_machines_drawn(
     drawn_of_200: DrawnMachine,
 ) -> None:
     """Without listed values, which are not symmetric."""
-    after_is_no_more_than_before(loaded(without_lists(drawn_of_200.file)))
+    after_is_no_more_than_before(Known(loaded(without_lists(drawn_of_200.file))))
 
 
 def without_lists(file: File) -> File:

@@ -10,18 +10,20 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Literal
 
 import numpy as np
+import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
 import truepose as tp
+from drawn_sweeps import spread
 from machine_file import File, loaded, rows_of
 from machine_file_units import bare
 from machine_under_test import MachineUnderTest
-from random_machines import DrawnMachine
+from random_machines import DRAWN, DrawnMachine
 from reference_kinematics import angles_of, rotation_by_vector, rotation_of_quaternion
 from truepose.machine import Machine
 from turned_machine import turned
@@ -38,6 +40,13 @@ ROUNDING = 2e-13
 """m or rad: a difference of positions of a metre or two, each good to some 1e-16, and amplified."""
 RELATIVE = 1e-9
 SAMPLES = 64
+
+
+@pytest.fixture(params=spread(DRAWN), ids=lambda machine: f"drawn-{machine.name}")
+def drawn(request: pytest.FixtureRequest) -> DrawnMachine:
+    """One of the 100 random machines, of which the CI takes one in five."""
+    found: DrawnMachine = request.param
+    return found
 
 
 def without_axes(file: File, *, undirected: bool, envelope: Envelope) -> File:
@@ -74,7 +83,7 @@ def without_axes(file: File, *, undirected: bool, envelope: Envelope) -> File:
     return result
 
 
-@dataclass
+@dataclass(eq=False)
 class Turned:
     """A machine, and the same one elsewhere."""
 
@@ -117,6 +126,18 @@ class Turned:
         return np.asarray(turn @ whole_tensor(covariance) @ turn.T)
 
 
+@cache
+def turned_without_axes(machine: MachineUnderTest, envelope: Envelope) -> Turned:
+    """Nothing is told along axes that a worst case or a sample would see."""
+    return Turned(machine, undirected=False, envelope=envelope)
+
+
+@cache
+def turned_as_filed(machine: MachineUnderTest) -> Turned:
+    """With guideways that lean either way."""
+    return Turned(machine)
+
+
 def attained_home(machine: Machine) -> dict[str, float]:
     """Home by freedom, SI: the commanded ones as filed, the parasitic ones as they follow."""
     home = dict(zip(machine.dof, machine.kernel.home.tolist(), strict=True))
@@ -146,7 +167,7 @@ def assert_close(found: Floats, expected: Floats, what: str, rounding: float = R
 
 def what_is_known_turns(machine: MachineUnderTest) -> None:
     """Every source alone, and all together; joints and forces have no axes."""
-    case = Turned(machine)
+    case = turned_as_filed(machine)
     first, second = case.budgets
     for name in first.source.values:
         before, after = (each.error.sel(source=name) for each in (first, second))
@@ -160,7 +181,7 @@ def what_is_known_turns(machine: MachineUnderTest) -> None:
 
 def spread_turns(machine: MachineUnderTest) -> None:
     """The first-order covariance, each source's own trace, and the exact samples' moments."""
-    case = Turned(machine)
+    case = turned_as_filed(machine)
     first, second = case.budgets
     for name in first.source.values:
         before, after = (
@@ -178,7 +199,7 @@ def spread_turns(machine: MachineUnderTest) -> None:
 
 def largest_error_has_no_axes(machine: MachineUnderTest) -> None:
     """The longest error vector, to first order and at a corner."""
-    case = Turned(machine, undirected=False, envelope="none")
+    case = turned_without_axes(machine, "none")
     first = tp.worst_case(case.one, case.poses[:1])
     second = tp.worst_case(case.other, case.other_poses[:1])
     for name in ("magnitude_linear", "magnitude_exact"):
@@ -191,7 +212,7 @@ def a_force_of_any_direction_has_no_axes(machine: MachineUnderTest) -> None:
     Its direction may be looked for, so that a millionth is as good as equal; a box would be off by
     up to sqrt 3.
     """
-    case = Turned(machine, undirected=False, envelope="one")
+    case = turned_without_axes(machine, "one")
     first = tp.worst_case(case.one, case.poses[:1]).magnitude_linear.values
     second = tp.worst_case(case.other, case.other_poses[:1]).magnitude_linear.values
     off = float(np.abs(second / first - 1.0).max())
@@ -200,7 +221,7 @@ def a_force_of_any_direction_has_no_axes(machine: MachineUnderTest) -> None:
 
 def samples_turn(machine: MachineUnderTest) -> None:
     """Sample by sample."""
-    case = Turned(machine, undirected=False, envelope="none")
+    case = turned_without_axes(machine, "none")
     found = []
     for one, poses in ((case.one, case.poses), (case.other, case.other_poses)):
         found.append(tp.monte_carlo(one, poses[:1], SAMPLES, machine.seed))
@@ -213,7 +234,7 @@ def samples_turn(machine: MachineUnderTest) -> None:
 
 def commands_are_the_same(machine: MachineUnderTest) -> None:
     """Corrected joints, of a machine that commands whole vectors."""
-    case = Turned(machine)
+    case = turned_as_filed(machine)
     first = tp.compensate(case.one, case.poses)
     second = tp.compensate(case.other, case.other_poses)
     assert_close(

@@ -11,15 +11,24 @@ import copy
 from typing import Any
 
 import numpy as np
+import pytest
 
 import truepose as tp
-from compared_results import RELATIVE, assert_same
+from compared_results import assert_same
+from drawn_sweeps import spread
 from machine_file import File, loaded, rows_of
 from machine_file_units import resized
 from machine_under_test import MachineUnderTest
-from random_machines import DrawnMachine
+from random_machines import DRAWN, DrawnMachine
 
 SAMPLES = 64
+
+
+@pytest.fixture(params=spread(DRAWN), ids=lambda machine: f"drawn-{machine.name}")
+def drawn(request: pytest.FixtureRequest) -> DrawnMachine:
+    """One of the 100 random machines, of which the CI takes one in five."""
+    found: DrawnMachine = request.param
+    return found
 
 
 def without_classes(file: File) -> File:
@@ -51,14 +60,21 @@ class InProportion:
         *,
         poses: int = 3,
         but: tuple[str, ...] = (),
-        relative: float = RELATIVE,
         **asked: Any,
     ) -> None:
         """What `run` says of the larger one is in proportion, at the first so many poses."""
+        assert_same(*self.results(run, poses, asked), self.powers, but=but)
+
+    def results(self, run: Any, poses: int, asked: dict[str, Any]) -> tuple[Any, Any]:
+        """Of both, at the first so many poses."""
         k, at = self.factor, self.poses[:poses]
         by_freedom = [k if name in "xyz" else 1.0 for name in self.one.commanded]
-        first, second = run(self.one, at, **asked), run(self.other, at * by_freedom, **asked)
-        assert_same(first, second, {"m": k, "N": k**2}, but=but, relative=relative)
+        return run(self.one, at, **asked), run(self.other, at * by_freedom, **asked)
+
+    @property
+    def powers(self) -> dict[str, float]:
+        """By how much a unit's numbers are larger."""
+        return {"m": self.factor, "N": self.factor**2}
 
 
 def first_order_and_samples(machine: MachineUnderTest) -> None:
@@ -76,8 +92,9 @@ def worst_case_and_bounds(machine: MachineUnderTest) -> None:
     both.assert_of(tp.worst_case, poses=1, but=("vertices",))
     if not machine.kernel.overconstrained:
         # A magnitude's bound is refined until it is within 0.03 %, which rounding may end earlier.
-        both.assert_of(tp.bounds, poses=1, truncate=3, but=("magnitude",))
-        both.assert_of(tp.bounds, poses=1, truncate=3, relative=3e-4)
+        first, second = both.results(tp.bounds, 1, {"truncate": 3})
+        assert_same(first, second, both.powers, but=("magnitude",))
+        assert_same(first, second, both.powers, relative=3e-4)
 
 
 def test_a_shipped_machine_made_larger_errs_in_proportion(shipped: MachineUnderTest) -> None:

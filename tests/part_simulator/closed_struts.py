@@ -25,6 +25,8 @@ NOMINAL: Deviation = MappingProxyType({})
 CLOSE = 1e-8
 """m and rad: a step after which one more is all that rounding leaves to be done."""
 MOST = 30
+AT_ONCE = 10_000
+"""Machines times poses that are closed together: as many as a processor's cache holds."""
 
 
 class NotClosedError(ValueError):
@@ -89,6 +91,15 @@ class ClosedStruts:
         They are near points (n, 3) and rotations (n, 3, 3), where the nominal machine is.
         """
         shape = np.broadcast_shapes((1, len(joints)), *(np.shape(v) for v in deviation.values()))
+        each = max(1, AT_ONCE // shape[1])
+        if shape[0] > each:
+            every = {name: np.asarray(value) for name, value in deviation.items()}
+            blocks = [
+                self.forward(joints, points, rotations, _some(every, first, first + each))
+                for first in range(0, shape[0], each)
+            ]
+            found, turned = zip(*blocks, strict=True)
+            return np.concatenate(found), np.concatenate(turned)
         point = np.broadcast_to(points, (*shape, 3)).copy()
         rotation = np.broadcast_to(rotations, (*shape, 3, 3)).copy()
         last = np.inf
@@ -99,7 +110,8 @@ class ClosedStruts:
                 rows[..., self._moves], -gaps[..., np.newaxis]
             )[..., 0]
             point += step[..., :3]
-            rotation = _turned(step[..., 3:]) @ rotation
+            if max(self._moves) > 2:
+                rotation = _turned(step[..., 3:]) @ rotation
             if last < CLOSE:
                 return point, rotation
             last = np.abs(step).max()
@@ -134,11 +146,13 @@ class ClosedStruts:
         shape = np.broadcast_shapes(points.shape[:-1], joints.shape[:-1])
 
         def moved(prefix: str, value: Sequence[float] | Floats) -> Floats:
+            """(1 or s, 1 or n, 3): no larger than it has to be."""
             parts = [
-                np.broadcast_to(value[k] + deviation.get(f"{prefix}.{axis}", 0.0), shape)
+                np.atleast_2d(value[k] + deviation.get(f"{prefix}.{axis}", 0.0))
                 for k, axis in enumerate("xyz")
             ]
-            return np.stack(parts, axis=-1)
+            found = np.stack(np.broadcast_arrays(*parts), axis=-1)
+            return found if len(shape) > 1 else found[0]
 
         tool = moved("tool", self.reference.tool)
         gaps = np.empty((*shape, len(self.struts)))
@@ -147,7 +161,7 @@ class ClosedStruts:
         for k, strut in enumerate(self.struts):
             name = f"strut.{strut['name']}"
             own = moved(f"{name}.platform", strut["platform"]) - tool
-            platform = points + np.einsum("...ij,...j->...i", rotations, own)
+            platform = points + _times(rotations, own)
             base = moved(f"{name}.base", strut["base"])
             length: Floats | float = (strut["length"] or 0.0) + deviation.get(f"{name}.length", 0.0)
             way = np.zeros((*shape, 3))
@@ -172,7 +186,7 @@ class ClosedStruts:
             along = span / distance[..., np.newaxis]
             gaps[..., k] = distance - length
             rows[..., k, :3] = along
-            rows[..., k, 3:] = np.cross(platform - points, along)
+            rows[..., k, 3:] = _cross(platform - points, along)
             if strut["drive"] is not None:
                 of_joints[..., k, at] = -(along * way).sum(axis=-1) - longer
         return gaps, rows, of_joints
@@ -217,6 +231,26 @@ _CARRIED = {"slider": _on_carriage, "crank": _on_arm}
 def _rotations(angles: Floats) -> Floats:
     """(n, 3, 3) of angles (n, 3)."""
     return np.array([rotation_of(one) for one in angles])
+
+
+def _some(deviation: Mapping[str, Floats], first: int, last: int) -> Deviation:
+    """Of some of the machines."""
+    return {
+        name: value[first:last] if value.ndim > 1 and len(value) > 1 else value
+        for name, value in deviation.items()
+    }
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    """(..., 3) of matrices (..., 3, 3): written out, which for so small ones is quicker."""
+    x, y, z = (vectors[..., k, np.newaxis] for k in range(3))
+    return np.asarray(matrices[..., 0] * x + matrices[..., 1] * y + matrices[..., 2] * z)
+
+
+def _cross(one: Floats, other: Floats) -> Floats:
+    """(..., 3), written out."""
+    (a, b, c), (x, y, z) = (np.moveaxis(v, -1, 0) for v in (one, other))
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
 
 
 def _turned(vector: Floats) -> Floats:

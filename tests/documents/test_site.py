@@ -19,7 +19,7 @@ from browser import Heard, opened_browser
 from document_blocks import ROOT
 from sweeps import sweep
 
-pytestmark = [sweep, pytest.mark.timeout(900)]
+pytestmark = [sweep, pytest.mark.timeout(3600)]
 
 WIDTHS = [390, 820, 1400]
 # Pages of each part; the first has figures that are drawn by the script.

@@ -12,19 +12,20 @@ from typing import Any
 from system_package import missing
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
-# The browser looks for no updates and asks no service; WebGL is drawn by the processor.
+PATIENCE = 180_000
+"""Milliseconds: there for what hangs; a busy machine is slow, and slowness is no fault here."""
+# The browser looks for no updates and asks no service. WebGL is drawn by the processor, and
+# nothing else goes through it: pages and canvases would take several times as long.
 FLAGS = [
     "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
+    "--disable-gpu",
 ]  # fmt: skip
 
 
 @contextmanager
-def opened_browser(profile: Path, *, live: bool = False) -> Iterator[Any]:
-    """The browser, with its profile in a folder; skips where it or playwright is missing.
-
-    `live`: canvases do not go through WebGL, by which each step of a live page takes seconds.
-    """
+def opened_browser(profile: Path) -> Iterator[Any]:
+    """The browser, with its profile in a folder; skips where it or playwright is missing."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
@@ -37,8 +38,9 @@ def opened_browser(profile: Path, *, live: bool = False) -> Iterator[Any]:
             executable_path=CHROMIUM,
             headless=True,
             viewport={"width": 1200, "height": 900},
-            args=[*FLAGS, "--disable-gpu" if live else "--use-angle=swiftshader"],
+            args=FLAGS,
         )
+        context.set_default_timeout(PATIENCE)
         yield context
         context.close()
 
@@ -65,3 +67,16 @@ class Heard:
     def outside(self) -> list[str]:
         """Requests that did not stay on the disk."""
         return [url for url in self.requests if not url.startswith(("file:", "data:", "blob:"))]
+
+
+def serious_violations(page: Any) -> list[tuple[str, str]]:
+    """What keeps people from reading or using a page, by axe: each rule, with the first place."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    # Places where a rule holds are not listed: they take a third of the time.
+    violations = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
+    return [
+        (one["id"], one["nodes"][0]["html"][:200])
+        for one in violations
+        if one["impact"] in {"serious", "critical"}
+    ]

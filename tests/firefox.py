@@ -22,7 +22,7 @@ from typing import Any
 from browser import Heard
 from system_package import missing
 
-PATIENCE = 60.0
+PATIENCE = 180.0
 """Seconds: a busy machine is slow, and slowness is no fault here."""
 
 PREFERENCES = {

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import truepose as tp
-from browser import Heard
+from browser import PATIENCE, Heard
 
 SHOWN = ["planar_two_slider", "hexapod", "linear_delta", "tricept"]
 """Machines whose live pages are opened."""
 QUICK = {"planar_two_slider"}
-
-PATIENCE = 60_000
-"""Milliseconds: a busy machine is slow, and slowness is no fault here."""
 
 DRAWN = "() => document.documentElement.dataset.liveReady === 'drawn'"
 STEP = """([name, value]) => {

@@ -8,11 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from browser import Heard
+from browser import PATIENCE, Heard
 from served_studio import ServedStudio
-
-PATIENCE = 60_000
-"""Milliseconds: a busy machine is slow, and slowness is no fault here."""
 
 PIXELS = """name => document.querySelector(`#live [data-live="${name}"]`).toDataURL()"""
 NUMBER = """name => {

@@ -24,7 +24,7 @@ nitpicky = True
 myst_enable_extensions = ["dollarmath", "attrs_inline", "deflist"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
-nb_execution_timeout = 120
+nb_execution_timeout = 900  # there for what hangs: a busy machine is several times slower
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 

@@ -25,6 +25,8 @@ from truepose.cli import cli, run
 from truepose.machine.families import REGISTRY
 from truepose.workpiece.read import read_part
 
+pytestmark = pytest.mark.timeout(1200)
+
 CODE_PAGES = [page for page in pages() if any(block.is_code for block in blocks_of(page))]
 QUESTIONS = {"check", "calibrate", "compare"}
 """Commands whose exit code 1 is the answer no."""

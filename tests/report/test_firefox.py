@@ -43,7 +43,7 @@ def firefox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
 
 @pytest.fixture(scope="module")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with opened_browser(tmp_path_factory.mktemp("chromium"), live=True) as context:
+    with opened_browser(tmp_path_factory.mktemp("chromium")) as context:
         yield context.new_page()
 
 

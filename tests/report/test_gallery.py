@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import truepose as tp
-from browser import Heard, opened_browser
+from browser import PATIENCE, Heard, opened_browser
 from build_machine import MACHINES
 from document_blocks import ROOT
 from system_package import require_web_kernel
@@ -22,8 +22,8 @@ from truepose.reporting.live import page, part
 
 Capture = pytest.CaptureFixture[str]
 SITE = ROOT / "docs" / "site"
+pytestmark = pytest.mark.timeout(1200)
 KINDS = ["planar_two_slider", "hexapod"]
-PATIENCE = 60_000
 SHOWN = """() => Object.fromEntries([...document.querySelectorAll(
   '#live [data-of]')].map(one => [one.dataset.of, one.textContent]))"""
 

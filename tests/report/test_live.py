@@ -13,18 +13,35 @@ import numpy as np
 import pytest
 
 import truepose as tp
-from browser import Heard, opened_browser
+from browser import Heard, opened_browser, serious_violations
 from command_line import MACHINES
 from live_visit import PATIENCE, QUICK, SHOWN, STEP, WORD, LiveVisit, moved
-from sweeps import thinned
+from sweeps import long_member, sweep, thinned
 from system_package import require_web_kernel
 from truepose.cli import run
+
+pytestmark = pytest.mark.timeout(1200)
+
+REPORTED = MACHINES / "planar_two_slider.toml"
+
+IN_THE_CI = {*QUICK, "hexapod"}
+"""In the plane and in space: for the page itself, whose words and controls are alike for all."""
+of_pages = pytest.mark.parametrize(
+    "live",
+    [
+        pytest.param(name, marks=() if name in QUICK else sweep)
+        if name in IN_THE_CI
+        else long_member(name)
+        for name in SHOWN
+    ],
+    indirect=True,
+)
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     require_web_kernel()
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
+    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
         yield context
 
 
@@ -101,6 +118,7 @@ def test_the_bound_and_the_witness_are_those_of_the_package(live: LiveVisit) -> 
     assert likely <= found * (1 + 1e-9) <= proven * (1 + 1e-6)
 
 
+@of_pages
 def test_the_verdict_is_computing_and_then_what_is_proven_or_found(live: LiveVisit) -> None:
     setting = live.setting
     words, target = setting["words"]["verdicts"], setting["bundle"]["target"]
@@ -129,6 +147,7 @@ def test_the_verdict_is_computing_and_then_what_is_proven_or_found(live: LiveVis
     assert live.word("before") == words["missed"]
 
 
+@of_pages
 def test_pixels_follow(live: LiveVisit) -> None:
     live.settle()
     name = live.machine.commanded[0]
@@ -145,6 +164,7 @@ def test_pixels_follow(live: LiveVisit) -> None:
         assert live.pixels("machine") != turned
 
 
+@of_pages
 def test_the_scale_of_the_map_stays_until_it_is_asked(live: LiveVisit) -> None:
     def ends() -> list[str]:
         return [live.page.locator(f"[data-live={end}]").inner_text() for end in ("low", "high")]
@@ -160,6 +180,7 @@ def test_the_scale_of_the_map_stays_until_it_is_asked(live: LiveVisit) -> None:
     assert ends() == before
 
 
+@of_pages
 def test_out_of_reach_is_said_and_not_drawn(live: LiveVisit) -> None:
     words = live.setting["words"]
     unit = live.setting["bundle"]["units"]["length"]
@@ -181,27 +202,21 @@ def test_nothing_was_asked_and_nothing_went_wrong(live: LiveVisit) -> None:
     assert live.complaints == []
 
 
+@of_pages
 @pytest.mark.parametrize("width", [1400, 400])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_serious_keeps_people_from_using_it(
-    width: int, scheme: str, live: LiveVisit
-) -> None:
-    from axe_playwright_python.sync_playwright import Axe
-
+def test_nothing_serious_keeps_people_from_using_it(width: int, live: LiveVisit) -> None:
     live.page.set_viewport_size({"width": width, "height": 900})
-    live.page.emulate_media(color_scheme=scheme)
-    wide, window = live.page.evaluate(
-        "() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
-    )
-    violations = Axe().run(live.page).response["violations"]
-    live.page.emulate_media(color_scheme="light")
-    live.page.set_viewport_size({"width": 1200, "height": 900})
-    assert wide <= window
-    assert not [
-        (one["id"], one["nodes"][0]["html"][:200])
-        for one in violations
-        if one["impact"] in {"serious", "critical"}
-    ]
+    try:
+        for scheme in ("light", "dark"):
+            live.page.emulate_media(color_scheme=scheme)
+            wide, window = live.page.evaluate(
+                "() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+            )
+            assert wide <= window, scheme
+            assert serious_violations(live.page) == [], scheme
+    finally:
+        live.page.emulate_media(color_scheme="light")
+        live.page.set_viewport_size({"width": 1200, "height": 900})
 
 
 def test_a_source_that_is_not_live_is_named_and_nothing_judged(
@@ -238,18 +253,22 @@ def test_in_another_language_why_is_said_in_it(browser: Any, tmp_path: Path) -> 
     live.page.close()
 
 
+@pytest.fixture(scope="module")
+def report_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("report") / "report.html"
+    assert run(["report", str(REPORTED), "--output", str(file)]) == 0
+    return file
+
+
 @pytest.mark.parametrize("lacking", ["WebAssembly", "Worker"])
 def test_without_what_it_needs_the_report_stays_static(
-    lacking: str, browser: Any, tmp_path: Path
+    lacking: str, browser: Any, report_file: Path
 ) -> None:
-    file = tmp_path / "report.html"
-    machine = MACHINES / "planar_two_slider.toml"
-    assert run(["report", str(machine), "--output", str(file)]) == 0
     page = browser.new_page()
     heard = Heard()
     heard.listen(page)
     page.add_init_script(f"delete globalThis.{lacking}")
-    page.goto(file.as_uri(), wait_until="load")
+    page.goto(report_file.as_uri(), wait_until="load")
     page.wait_for_selector("html[data-ready=drawn]", timeout=PATIENCE)
     assert page.locator("#live-absent").is_visible()
     assert page.locator(".live-body").is_hidden()
@@ -258,11 +277,8 @@ def test_without_what_it_needs_the_report_stays_static(
     page.close()
 
 
-def test_the_report_has_it_and_paper_has_not(browser: Any, tmp_path: Path) -> None:
-    file = tmp_path / "report.html"
-    machine = MACHINES / "planar_two_slider.toml"
-    assert run(["report", str(machine), "--output", str(file)]) == 0
-    live = opened(browser, file, tp.load(machine))
+def test_the_report_has_it_and_paper_has_not(browser: Any, report_file: Path) -> None:
+    live = opened(browser, report_file, tp.load(REPORTED))
     live.page.wait_for_selector("html[data-ready=drawn]", timeout=PATIENCE)
     live.settle()
     assert live.page.locator("nav a[href='#live']").count() == 1

@@ -33,7 +33,7 @@ def needs_kernel() -> None:
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     needs_kernel()
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
+    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
         yield context
 
 

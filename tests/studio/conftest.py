@@ -17,7 +17,7 @@ from system_package import require_web_kernel
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     require_web_kernel()
-    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
+    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
         yield context
 
 

@@ -237,7 +237,7 @@ def soak(
     (own / "part.ngc").write_text(PROGRAM)
     with (
         said.open("w") as stderr,
-        opened_browser(folder / "profile", live=True) as browser,
+        opened_browser(folder / "profile") as browser,
     ):
         port = ("--port", str(free_port()))
         studio = started(own / "m.toml", folder / "state", *port, stderr=stderr, more=environment)

@@ -69,7 +69,7 @@ test-all: test-rust test-python-all $(if $(TRUEPOSE_CI),,test-wasi) ## run every
 
 .PHONY: test-rust
 test-rust: cargo $(MADE) ## run the kernel's tests
-	$(CARGO) test --workspace --release --locked
+	$(CARGO) test --workspace --profile tests --locked
 
 .PHONY: test-wasi
 test-wasi: cargo ## run the kernel's tests on WebAssembly under Node.js: rustup target add wasm32-wasip1

@@ -24,8 +24,10 @@ for name in ("machines", "examples", "tests"):
 def run_shell(line: str) -> None:
     """What a line with `!` does here: print what the commands print, and stop where one is refused.
 
-    1 is the answer no, and 141 what a command says whose reader (`head`) has seen enough.
+    Names in braces are those of the page, as in a notebook. 1 is the answer no, and 141 what a
+    command says whose reader (`head`) has seen enough.
     """
+    line = get_ipython().var_expand(line)
     command = ["bash", "-o", "pipefail", "-c", line]
     run = subprocess.run(  # noqa: S603 a line of our pages
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False

@@ -169,6 +169,7 @@ CATALOGUE: dict[str, str] = {
     # studies
     "bad-vary": "a variable of a study that cannot be read, or that changes the poses",
     "bad-design": "a design of a study without what it needs, or with what it does not take",
+    "bad-constraint": "a conditioning or travel to spare that no variant can be asked for",
     "bad-reach": "a share of the poses that no variant can be asked for",
     "study-too-large": "a study of more variants than are allowed",
     "other-study": "a store that holds another study than the one that is asked for",

@@ -73,6 +73,24 @@ if TYPE_CHECKING:
         help="Which share of the poses of the base file a variant must have; with less it is "
         "infeasible, and has no numbers.",
     ),
+    click.option(
+        "--conditioning",
+        metavar="NUMBER",
+        type=float,
+        help="A variant whose conditioning (0 singular, 1 best) is less at a pose is infeasible.",
+    ),
+    click.option(
+        "--travel-left",
+        metavar="SHARE",
+        help="A variant is infeasible if a drive has less of its travel left to either end at a "
+        'pose, such as "5 %".',
+    ),
+    click.option(
+        "--minimise",
+        metavar="NAME",
+        help="Let an optimiser draw the --count N variants that make a number small: error, known, "
+        "coverage-before, coverage-after. Variables go from:to.",
+    ),
     set_option,
     format_option,
     click.option(
@@ -107,6 +125,9 @@ def command(
     seed: int,
     quantities: str | None,
     reach: str,
+    conditioning: float | None,
+    travel_left: str | None,
+    minimise: str | None,
     workers: int | None,
     scheduler: str | None,
     tls: Path | None,
@@ -157,6 +178,16 @@ def command(
                 code="bad-reach",
                 expected='a share of the poses, such as "98 %" or 0.98',
             ),
+            conditioning=conditioning,
+            travel_left=None
+            if travel_left is None
+            else read_share(
+                "--travel-left",
+                travel_left,
+                code="bad-constraint",
+                expected='a share of the travel, such as "5 %" or 0.05',
+            ),
+            minimise=minimise,
         )
         say_machine(prepared.machine)
     if output is None:

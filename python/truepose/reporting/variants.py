@@ -14,7 +14,7 @@ from truepose.reporting.display import column
 from truepose.reporting.result import Result
 from truepose.reporting.table import Table
 from truepose.studies.block import FAILED, INFEASIBLE, NOT_COMPUTED, OK
-from truepose.studies.ranking import causes, ranked
+from truepose.studies.ranking import causes, objective_of, ranked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,10 +78,15 @@ def _best(machine: Machine, dataset: xr.Dataset, best: Indices) -> Table:
                 header.append(f"{title}, {kind} [{unit.label}]")
                 values = dataset[name].values[best, at] * unit.per_si
                 columns.append(list(column(values, unit.decimals)))
+    if "conditioning" in dataset:
+        header += ["conditioning", "travel left [%]"]
+        columns.append(list(column(dataset["conditioning"].values[best], 4)))
+        columns.append(list(column(100.0 * dataset["travel_left"].values[best], 1)))
     if (reach := dataset["reach"].values[best]).min() < 1.0:
         header.append("reach [%]")
         columns.append(list(column(100.0 * reach, 2)))
-    how = "of the smallest linear maximum" if "linear_maximum" in dataset else "the first"
+    objective = objective_of(dataset)
+    how = f"of the smallest {objective.title}" if objective.variable in dataset else "the first"
     every = int((dataset["status"].values == OK).sum())
     note = f"{best.size} of {every:,} variants that are ok, {how}." if every > best.size else ""
     rows = tuple(zip(*columns, strict=True))

@@ -27,15 +27,13 @@ from truepose.runs.poses import (
 )
 from truepose.runs.quantities import quantities
 from truepose.studies.base_machine import BaseMachine, evaluated
-from truepose.studies.quantities import SOURCE_NAMES, EvaluatedVariant, chosen
+from truepose.studies.constraints import Constraints
+from truepose.studies.quantities import SOURCE_NAMES, EvaluatedVariant, Kinematics, chosen
 from truepose.verdict.answer import STATES
 
 NOT_COMPUTED, OK, INFEASIBLE, FAILED = "not computed", "ok", "infeasible", "failed"
 DEFECT = "defect"
 """Code of a variant on which this program itself fails."""
-
-ROUNDING = 1e-12
-"""Of a share of poses: what is asked for in percent is no shorter than that."""
 
 Arrays = dict[str, np.ndarray]
 
@@ -46,7 +44,9 @@ STATUS: Schema = {
     "first_lost": Variable(
         ("variant",), "1", "number of the first pose lost in the file's poses, -1 of none", np.int64
     ),
-    "code": Variable(("variant",), "1", "code of what a failed variant fails by", str),
+    "code": Variable(
+        ("variant",), "1", "code of what a variant fails by, or of its constraint", str
+    ),
     "reason": Variable(("variant",), "1", "why a variant is infeasible or failed", str),
 }
 """What every study has of every variant."""
@@ -59,16 +59,20 @@ FILL: Mapping[type, Any] = {np.float64: np.nan, np.int64: -1, np.bool_: False, s
 class BlockTask:
     """Some variants that are evaluated together: `variants` are the settings of each.
 
-    `number`: which block it is; `quantities`: names of what is computed of each; `least_reach`:
-    share of the poses below which a variant is infeasible; `instruction_set`: what computes.
+    `number`: which block it is; `quantities`: names of what is computed of each; `constraints`:
+    without which a variant is infeasible; `instruction_set`: what computes.
     """
 
     number: int
     base: BaseMachine
     variants: tuple[tuple[str, ...], ...]
     quantities: tuple[str, ...]
-    least_reach: float
+    constraints: Constraints
     instruction_set: str
+
+    def of(self, number: int, variants: tuple[tuple[str, ...], ...]) -> BlockTask:
+        """The same of other variants."""
+        return replace(self, number=number, variants=variants)
 
 
 def schema_of(names: tuple[str, ...]) -> Schema:
@@ -159,13 +163,19 @@ def _parts(task: BlockTask, settings: tuple[str, ...]) -> Iterator[dict[str, Any
     skipped, evaluation = evaluated(machine)
     reach = reach_of(base, machine, skipped)
     yield reach
-    if reach["reach"] < task.least_reach - ROUNDING:
+    if task.constraints.loses_reach(reach["reach"]):
         yield {"status": INFEASIBLE}
         return
     if evaluation is None:
         required_sources(machine, machine.condition)  # raises: without one there is no budget
         raise no_pose_left(machine, machine.poses(), skipped, of_file=True)
     variant = EvaluatedVariant(machine, evaluation)
+    if task.constraints.needs_kinematics:
+        kinematics = Kinematics.of(variant)
+        yield kinematics
+        if broken := task.constraints.broken(kinematics):
+            yield {**broken, "status": INFEASIBLE}
+            return
     for quantity in chosen(task.quantities):
         yield quantity.of(variant)
     yield {"status": OK}

@@ -35,6 +35,9 @@ COORDS = (
 )  # fmt: skip
 """All coordinates that a study may have, in their order."""
 
+PLAN = ("setting", "value")
+"""Those that are the plan."""
+
 KEY, PLAN_HASH, BLOCK = "study", "plan_hash", "block"
 """Attributes: what makes it this study (JSON), SHA-256 of its plan, variants of a block."""
 
@@ -115,6 +118,7 @@ __all__ = [
     "COORDS",
     "DONE",
     "KEY",
+    "PLAN",
     "PLAN_HASH",
     "done_variable",
     "labels_of",

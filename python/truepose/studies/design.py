@@ -52,7 +52,7 @@ def laid_out(varied: Sequence[VariedKey], design: str, count: int | None, seed: 
     if design == FACTORIAL:
         return _factorial(varied, count)
     size = _required_count(count, design)
-    shares = _points(design, size, len(varied), seed)
+    shares = points(design, size, len(varied), seed)
     return [variable.at_shares(shares[:, at]) for at, variable in enumerate(varied)]
 
 
@@ -95,8 +95,8 @@ def _required_count(count: int | None, design: str) -> int:
     return size
 
 
-def _points(design: str, count: int, dimensions: int, seed: int) -> Floats:
-    """(count, dimensions) shares in [0, 1)."""
+def points(design: str, count: int, dimensions: int, seed: int) -> Floats:
+    """(count, dimensions) shares in [0, 1). Raises `RequestError` (extra-missing)."""
     qmc = _qmc()
     if design == LATIN_HYPERCUBE:
         drawn = qmc.LatinHypercube(dimensions, rng=seed).random(count)
@@ -146,4 +146,12 @@ def _bad_design(message: str, given: str, expected: str) -> RequestError:
     return RequestError(Problem("bad-design", message, found=given, expected=expected))
 
 
-__all__ = ["DESIGNS", "FACTORIAL", "LATIN_HYPERCUBE", "MOST_VARIANTS", "SOBOL", "laid_out"]
+__all__ = [
+    "DESIGNS",
+    "FACTORIAL",
+    "LATIN_HYPERCUBE",
+    "MOST_VARIANTS",
+    "SOBOL",
+    "laid_out",
+    "points",
+]

@@ -170,11 +170,41 @@ class Coverage95(StudiedQuantity):
         return {"coverage_95": np.array(values)}
 
 
+class Kinematics(StudiedQuantity):
+    """How far the machine is from singularities and from the ends of its travel."""
+
+    name = "kinematics"
+    doc = "worst conditioning over the poses, and the least share of a travel that is left"
+    quick = False
+    schema: ClassVar[Schema] = {
+        "conditioning": Variable(
+            ("variant",), "1", "worst over poses: smallest to largest singular value, scaled"
+        ),
+        "travel_left": Variable(
+            ("variant",), "1", "share of a drive's travel to its nearer end, least over poses"
+        ),
+    }
+
+    @staticmethod
+    def of(variant: EvaluatedVariant) -> dict[str, np.ndarray]:
+        """Each a number, of the nominal machine at the poses that it has."""
+        machine = variant.machine
+        poses = np.delete(machine.poses(), variant.evaluation.run.left_out.sorted()[0], axis=0)
+        joints = machine.inverse(poses)
+        ends = np.array([drive.travel for drive in machine.drives])
+        spare = np.minimum(joints - ends[:, 0], ends[:, 1] - joints) / (ends[:, 1] - ends[:, 0])
+        return {
+            "conditioning": np.array(machine.conditioning(poses).min()),
+            "travel_left": np.array(spare.min()),
+        }
+
+
 REGISTRY: tuple[type[StudiedQuantity], ...] = (
     LargestError,
     AccuracyVerdict,
     SourceShares,
     Coverage95,
+    Kinematics,
 )
 
 QUICK_NAMES = tuple(one.name for one in REGISTRY if one.quick)
@@ -206,6 +236,7 @@ __all__ = [
     "REGISTRY",
     "SOURCE_NAMES",
     "EvaluatedVariant",
+    "Kinematics",
     "StudiedQuantity",
     "chosen",
 ]

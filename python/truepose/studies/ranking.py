@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,8 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.studies.block import FAILED, INFEASIBLE, OK
+from truepose.studies.dataset import KEY
+from truepose.studies.objectives import MINIMISE, OBJECTIVES, Objective
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,15 +27,21 @@ class WhyNotOk:
     reason: str
 
 
+def objective_of(dataset: xr.Dataset) -> Objective:
+    """What makes a variant better: what was minimised, or the linear maximum of the position."""
+    asked = json.loads(dataset.attrs.get(KEY, "{}")).get(MINIMISE)
+    return OBJECTIVES[asked or "error"]
+
+
 def ranked(dataset: xr.Dataset) -> Indices:
-    """Numbers of the variants that are ok, of the smallest linear maximum of the position first.
+    """Numbers of the variants that are ok, the best by `objective_of` first.
 
     In the order of the plan where the study has no such number.
     """
     fine = np.flatnonzero(dataset["status"].values == OK)
-    if "linear_maximum" in dataset:
-        sizes = dataset["linear_maximum"].values[fine, 0]
-        fine = fine[np.argsort(sizes, kind="stable")]
+    objective = objective_of(dataset)
+    if objective.variable in dataset:
+        fine = fine[np.argsort(objective.of(dataset)[fine], kind="stable")]
     return fine.astype(np.intp)
 
 
@@ -65,4 +74,4 @@ def causes(dataset: xr.Dataset) -> list[WhyNotOk]:
     return [WhyNotOk(word, len(of), of[0], str(reasons[of[0]])) for (word, _), of in rows]
 
 
-__all__ = ["WhyNotOk", "causes", "pareto", "ranked"]
+__all__ = ["WhyNotOk", "causes", "objective_of", "pareto", "ranked"]

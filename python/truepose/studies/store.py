@@ -28,13 +28,16 @@ from truepose.files.wording import counted
 from truepose.files.writing import uninterrupted
 from truepose.runs.dataset import labelled_dataset
 from truepose.studies.block import FILL, NOT_COMPUTED, Arrays, schema_of
-from truepose.studies.dataset import BLOCK, COORDS, DONE, KEY, PLAN_HASH, done_variable
+from truepose.studies.dataset import BLOCK, COORDS, DONE, KEY, PLAN, PLAN_HASH, done_variable
 from truepose.studies.plan import StudyPlan
 
 if TYPE_CHECKING:
     import xarray as xr
 
 ENDING = ".zarr"
+
+PLANNED = 10_000
+"""Variants of a chunk of a plan that is written at once."""
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 STILL_WRITTEN = 2.0
@@ -176,11 +179,14 @@ class StudyStore:
                 file.unlink()
 
 
-def created(path: Path, labels: xr.Dataset, results: dict[str, xr.Variable]) -> StudyStore:
+def created(
+    path: Path, labels: xr.Dataset, results: dict[str, xr.Variable], *, planned: int = PLANNED
+) -> StudyStore:
     """A new store with a plan in which no variant is done yet.
 
     `labels`: the plan and the coordinates; `results`: the variables that it will have, of whose
-    values only the shape counts. Raises `RequestError` (output-not-writable).
+    values only the shape counts; `planned`: variants of a chunk of the plan. Raises
+    `RequestError` (output-not-writable).
     """
     import zarr
 
@@ -190,7 +196,7 @@ def created(path: Path, labels: xr.Dataset, results: dict[str, xr.Variable]) -> 
     results = {**results, DONE: done_variable(np.zeros(count, np.bool_))}
     try:
         chunks = {
-            name: {"chunks": (_planned(count), *one.shape[1:])}
+            name: {"chunks": (min(count, planned if name in PLAN else PLANNED), *one.shape[1:])}
             for name, one in labels.variables.items()
             if one.dims[0] == "variant"
         }
@@ -232,11 +238,6 @@ def _kind(variable: xr.Variable) -> type:
     return {"O": str, "f": np.float64, "i": np.int64, "b": np.bool_}[variable.dtype.kind]
 
 
-def _planned(count: int) -> int:
-    """Variants of a chunk of the plan, which is written at once."""
-    return min(count, 10_000)
-
-
 def _temporary(path: Path) -> Path:
     return path.with_name(f".{path.stem}.{secrets.token_hex(4)}{ENDING}")
 
@@ -265,4 +266,12 @@ def not_writable(path: Path, failure: OSError, hint: str | None) -> RequestError
     )
 
 
-__all__ = ["ENDING", "StudyStore", "created", "not_writable", "require_packages", "sweep_beside"]
+__all__ = [
+    "ENDING",
+    "PLANNED",
+    "StudyStore",
+    "created",
+    "not_writable",
+    "require_packages",
+    "sweep_beside",
+]

@@ -27,14 +27,19 @@ from truepose.studies.block import (
     empty_arrays,
     evaluate_block,
 )
+from truepose.studies.constraints import Constraints, required_constraints
 from truepose.studies.dataset import DONE, done_variable, labels_of, results_of
-from truepose.studies.design import FACTORIAL
+from truepose.studies.design import FACTORIAL, SOBOL
 from truepose.studies.evaluators import BlockEvaluator, Local, evaluator_of
 from truepose.studies.lock import only_writer
+from truepose.studies.minimise import Minimised, undrawn
+from truepose.studies.objectives import MINIMISE, Objective, required_objective
+from truepose.studies.optimiser import require_no_design, require_search
 from truepose.studies.plan import StudyPlan, plan_of, try_values
-from truepose.studies.quantities import QUICK_NAMES, chosen
+from truepose.studies.quantities import QUICK_NAMES, Kinematics, chosen
 from truepose.studies.store import (
     ENDING,
+    PLANNED,
     StudyStore,
     created,
     require_packages,
@@ -68,6 +73,9 @@ PARTS = {
     "seed": "the seed",
     "quantities": "the quantities",
     "reach": "the reach",
+    "conditioning": "the conditioning that is asked for",
+    "travel_left": "the travel that is to be left",
+    MINIMISE: "what is minimised",
     "truepose_version": "the version of truepose",
 }
 """What makes a study this one, and how it is called where another has another."""
@@ -81,27 +89,40 @@ class PreparedStudy:
     machine: Machine
     varied: tuple[VariedKey, ...]
     quantities: tuple[str, ...]
+    constraints: Constraints
     key: Mapping[str, Any]
 
+    @property
+    def objective(self) -> Objective | None:
+        """What an optimiser is to make small; None of a study whose plan is drawn."""
+        name = self.key[MINIMISE]
+        return None if name is None else required_objective(name)
+
     def plan(self) -> StudyPlan:
-        """Draw the plan. Raises as `design.laid_out`."""
+        """Draw the plan; of an optimiser an empty one. Raises as `laid_out`, `require_search`."""
         asked = self.key
+        if self.objective is not None:
+            return undrawn(self.varied, require_search(self.varied, asked["count"]))
         return plan_of(self.varied, asked["design"], asked["count"], asked["seed"])
+
+    def block(self, plan: StudyPlan) -> int:
+        """Variants that are kept at once: few, so that little is lost with a process."""
+        if self.objective is not None:
+            return 1
+        return min(LARGEST_BLOCK, max(1, -(-len(plan) // BLOCKS)))
+
+    def task(self, instructions: str) -> BlockTask:
+        """What all blocks have."""
+        return BlockTask(0, self.base, (), self.quantities, self.constraints, instructions)
 
     def tasks(
         self, plan: StudyPlan, numbers: Indices, block: int, instructions: str
     ) -> Iterator[BlockTask]:
         """The blocks of these `numbers`, of so many variants each."""
+        empty = self.task(instructions)
         for number in numbers.tolist():
             rows = range(number * block, min((number + 1) * block, len(plan)))
-            yield BlockTask(
-                number,
-                self.base,
-                tuple(plan.of_variant(row) for row in rows),
-                self.quantities,
-                self.key["reach"],
-                instructions,
-            )
+            yield empty.of(number, tuple(plan.of_variant(row) for row in rows))
 
 
 @dataclass(frozen=True)
@@ -130,6 +151,9 @@ def study(
     settings: Mapping[str, str] | Sequence[str] = (),
     quantities: Sequence[str] = QUICK_NAMES,
     reach: float = 1.0,
+    conditioning: float | None = None,
+    travel_left: float | None = None,
+    minimise: str | None = None,
     output: str | Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -143,7 +167,13 @@ def study(
     "KEY=VALUES" (docs/studies.md). `design`: "factorial", or "latin-hypercube" or "sobol" with a
     `count` of variants and a `seed`. `settings`: changes that all variants have. `quantities`: what
     is computed, of "error", "verdict", "shares", "coverage". A variant that has less than the share
-    `reach` of the poses of the base file is infeasible, and has no numbers.
+    `reach` of the poses of the base file is infeasible, and has no numbers; so is one whose
+    `conditioning` (0 to 1) is worse at a pose, or one of whose drives has less than the share
+    `travel_left` of its travel to either end, where these are given.
+
+    `minimise`: an optimiser draws the variants, `count` of them, that make a number small: "error",
+    "known", "coverage-before" or "coverage-after". All variables go from one end to the other then,
+    "30:120 N/um"; there is no `design`. Every evaluation is kept, in its order.
 
     `output`: a store (.zarr) into which results are written block by block; the same call goes on
     with one that is not finished. `workers`: so many processes of this computer evaluate, or those
@@ -156,9 +186,10 @@ def study(
     "infeasible", "failed", "not computed"), `reason`, `reach`, and the quantities.
 
     Raises `MachineFileError` and `RequestError` as `truepose.load` does, and `RequestError`:
-    bad-vary, bad-design, study-too-large, bad-seed, bad-reach, unknown-choice, no-workspace,
-    no-pose-left, machine-file-changed, extra-missing, output-ending, output-not-writable,
-    output-exists, other-study, store-in-use, bad-workers, no-scheduler, no-worker, worker-lost.
+    bad-vary, bad-design, study-too-large, bad-seed, bad-reach, bad-constraint, unknown-choice,
+    no-workspace, no-pose-left, machine-file-changed, extra-missing, output-ending,
+    output-not-writable, output-exists, other-study, store-in-use, bad-workers, no-scheduler,
+    no-worker, worker-lost.
     """
     cluster = requested_cluster(workers, scheduler, tls)
     path = None if output is None else Path(output)
@@ -173,6 +204,9 @@ def study(
         settings=settings,
         quantities=quantities,
         reach=reach,
+        conditioning=conditioning,
+        travel_left=travel_left,
+        minimise=minimise,
     )
     with evaluator_of(cluster) as evaluator:
         return run(prepared, path, evaluator=evaluator, progress=progress)
@@ -197,9 +231,19 @@ def prepare(
     settings: Mapping[str, str] | Sequence[str],
     quantities: Sequence[str],
     reach: float,
+    conditioning: float | None = None,
+    travel_left: float | None = None,
+    minimise: str | None = None,
 ) -> PreparedStudy:
     """Read the base file, and what is varied of it; arguments and errors as `study`."""
-    names = tuple(one.name for one in chosen(list(quantities)))
+    constraints = required_constraints(reach, conditioning, travel_left)
+    wanted = list(quantities)
+    if minimise is not None:
+        wanted.append(required_objective(minimise).quantity)
+        require_no_design(design)
+    if constraints.needs_kinematics:
+        wanted.append(Kinematics.name)
+    names = tuple(one.name for one in chosen(wanted))
     given = [f"{k}={v}" for k, v in settings.items()] if isinstance(settings, Mapping) else settings
     own = [f"{k}={v}" for k, v in machine.settings.items()] if isinstance(machine, Machine) else []
     path = machine.path if isinstance(machine, Machine) else machine
@@ -215,13 +259,16 @@ def prepare(
         "count": count,
         "seed": seed,
         "quantities": list(names),
-        "reach": _required_reach(reach),
+        "reach": constraints.reach,
+        "conditioning": constraints.conditioning,
+        "travel_left": constraints.travel_left,
+        MINIMISE: minimise,
         "truepose_version": version(),
     }
-    prepared = PreparedStudy(base, loaded, varied, names, key)
+    prepared = PreparedStudy(base, loaded, varied, names, constraints, key)
     size = len(prepared.plan())  # a plan that cannot be drawn is told before values are tried
     base = try_values(base, varied)
-    key |= {"seed": int(seed), "count": None if design == FACTORIAL else size}
+    key |= {"seed": int(seed), "count": None if design == FACTORIAL and minimise is None else size}
     return replace(prepared, base=base, key={**key, "data_files": base.data_hashes})
 
 
@@ -242,20 +289,6 @@ def _require_same(machine: Machine, base: BaseMachine) -> None:
                 hint="give changes as settings=[...]",
             )
         )
-
-
-def _required_reach(reach: float) -> float:
-    if 0.0 < reach <= 1.0:
-        return float(reach)
-    raise RequestError(
-        Problem(
-            "bad-reach",
-            "no variant can be asked for such a share of the poses",
-            found=f"{reach:g}",
-            expected="a share above 0, at most 1, such as 0.98",
-            hint=f"{reach:g} % is {reach / 100:g}" if 1.0 < reach <= 100.0 else None,
-        )
-    )
 
 
 def run(
@@ -280,7 +313,8 @@ def run(
         stack.enter_context(only_writer(path))
         sweep_beside(path)
         store = _store(prepared, path, evaluator)
-        plan, done = store.plan(), int(store.done().sum())
+        plan = store.plan() if prepared.objective is None else prepared.plan()
+        done = int(store.done().sum())
         if done and going_on is not None:
             going_on(done, len(plan))
         return _evaluated(prepared, plan, store, evaluator, progress)
@@ -294,11 +328,12 @@ def _store(prepared: PreparedStudy, path: Path, evaluator: BlockEvaluator) -> St
         store.sweep()
         return store
     plan = prepared.plan()
-    block = block_of(len(plan))
+    block = prepared.block(plan)
     key = {**prepared.key, "instruction_set": evaluator.begun_with()}
     labels = labels_of(prepared.machine, plan, prepared.quantities, key, block)
     empty = empty_arrays(prepared.quantities, prepared.base.components, len(plan))
-    return created(path, labels, results_of(prepared.machine, prepared.quantities, empty))
+    results = results_of(prepared.machine, prepared.quantities, empty)
+    return created(path, labels, results, planned=PLANNED if prepared.objective is None else block)
 
 
 def _require_key(key: Mapping[str, Any], store: StudyStore) -> None:
@@ -326,16 +361,11 @@ def _shown(value: Any) -> str:
     return "none" if value is None else str(value)
 
 
-def block_of(count: int) -> int:
-    """Variants of a block, of a study of so many: few, so that little is lost with a process."""
-    return min(LARGEST_BLOCK, max(1, -(-count // BLOCKS)))
-
-
 class _InMemory:
     """What a study of no store has done: the same as `StudyStore`, of arrays."""
 
     def __init__(self, prepared: PreparedStudy, plan: StudyPlan, instructions: str) -> None:
-        self.block = block_of(len(plan))
+        self.block = prepared.block(plan)
         self.key = {**prepared.key, "instruction_set": instructions}
         self._prepared, self._plan = prepared, plan
         self._arrays = empty_arrays(prepared.quantities, prepared.base.components, len(plan))
@@ -346,8 +376,9 @@ class _InMemory:
 
     def write(self, number: int, arrays: Arrays) -> None:
         rows = slice(number * self.block, (number + 1) * self.block)
+        asked = {"setting": self._plan.settings, "value": self._plan.values}
         for name, values in arrays.items():
-            self._arrays[name][rows] = values
+            (asked[name] if name in asked else self._arrays[name])[rows] = values
         self._done[rows] = True
 
     def read(self) -> xr.Dataset:
@@ -378,9 +409,16 @@ def _evaluated(
             progress(min(counted, left), left)
 
     try:
-        tasks = prepared.tasks(plan, numbers, store.block, instructions)
-        for number, arrays in evaluator.evaluate(tasks, told):
-            store.write(number, arrays)
+        if prepared.objective is None:
+            tasks = prepared.tasks(plan, numbers, store.block, instructions)
+            for number, arrays in evaluator.evaluate(tasks, told):
+                store.write(number, arrays)
+        else:
+            empty = prepared.task(instructions)
+            of = Minimised(
+                prepared.objective, prepared.varied, len(plan), prepared.key["seed"], empty
+            )
+            of.run(store, evaluator, told)
     except KeyboardInterrupt:
         interrupted = True
     return store.read().assign_attrs(interrupted=int(interrupted))
@@ -411,13 +449,12 @@ def _usable(store: StudyStore | _InMemory) -> str:
 def estimated(prepared: PreparedStudy) -> StudyCost:
     """How many variants a study has, how long they take, how large they are, measured on a few."""
     plan = prepared.plan()
-    count = len(plan)
-    block = block_of(count)
+    count, block = len(plan), prepared.block(plan)
+    if prepared.objective is not None:
+        plan = plan_of(prepared.varied, SOBOL, count, prepared.key["seed"])  # as good as any
     rows = np.unique(np.linspace(0, count - 1, MEASURED).round().astype(np.intp))
     settings = tuple(plan.of_variant(row) for row in rows.tolist())
-    task = BlockTask(
-        0, prepared.base, settings, prepared.quantities, prepared.key["reach"], instruction_set()
-    )
+    task = prepared.task(instruction_set()).of(0, settings)
     begun = time.perf_counter()
     arrays = evaluate_block(task)
     seconds = (time.perf_counter() - begun) / len(rows)

@@ -73,7 +73,7 @@ def serious_violations(page: Any) -> list[tuple[str, str]]:
     """What keeps people from reading or using a page, by axe: each rule, with the first place."""
     from axe_playwright_python.sync_playwright import Axe
 
-    # Places where a rule holds are not listed: they take a third of the time.
+    # Places where a rule holds are not listed: they take part of the time.
     violations = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
     return [
         (one["id"], one["nodes"][0]["html"][:200])

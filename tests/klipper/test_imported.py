@@ -89,7 +89,7 @@ def joints_of(text: str, positions: bytes) -> Klipper:
 def test_joints_are_klippers(
     name: str, poses: int, settings: dict[str, str], tmp_path: Path
 ) -> None:
-    """At 1e5 poses to which Klipper moves, to 1e-12 m."""
+    """At `poses` to which Klipper moves, to 1e-12 m."""
     text = config(name)
     path = tmp_path / "printer.cfg"
     path.write_text(text, "utf-8")

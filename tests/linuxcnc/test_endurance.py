@@ -1,4 +1,4 @@
-"""Random work in the real LinuxCNC: seconds of it in `make test`, two minutes in `make test-all`.
+"""Random work in the real LinuxCNC: seconds of it, and two minutes in what the CI leaves out.
 
 An hour was run once, by the same script: `endurance`.
 """

@@ -77,7 +77,7 @@ class _UsedUpError(Exception):
     """All evaluations are made."""
 
 
-class _Asked:
+class _Counted:
     """Counts what is asked, and knows the best."""
 
     def __init__(self, ask: Callable[[Floats], Floats], count: int) -> None:
@@ -103,7 +103,7 @@ def search(ask: Callable[[Floats], Floats], dimensions: int, count: int, seed: i
     from scipy.optimize import differential_evolution
 
     size = generation_of(dimensions)
-    asked = _Asked(ask, count)
+    asked = _Counted(ask, count)
     first = points(SOBOL, size, dimensions, seed)
     generations = max(int(EVOLVED * count) // size - 1, 1)
     try:
@@ -126,7 +126,7 @@ def search(ask: Callable[[Floats], Floats], dimensions: int, count: int, seed: i
         return
 
 
-def _simplex(asked: _Asked, dimensions: int, step: float) -> None:
+def _simplex(asked: _Counted, dimensions: int, step: float) -> None:
     """Go down from the best point that is known."""
     from scipy.optimize import minimize
 

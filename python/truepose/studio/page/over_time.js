@@ -26,6 +26,7 @@ const overTimeTab = {
     const none = element("p", {className: "caption"}, said.no_log);
     const choice = element("p", {className: "caption"}, element("label", {}, `${said.quantity} `, select));
     const there = element("div", {}, choice, chart, words);
+    none.hidden = there.hidden = true; // until it is known
     host.append(none, there);
     return {
       show(value) {

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import results_file
-from sweeps import COLLECTED, member_of
+from sweeps import COLLECTED, member_of, skip_beyond_time
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -30,6 +30,11 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     config.stash[COLLECTED] = [member_of(item) for item in items]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    skip_beyond_time(item)
 
 
 @pytest.fixture(scope="session")

@@ -3,11 +3,14 @@
 A sweep is one test that is run many times, for machines, seeds, instruments or flags. Its members
 with the marker `sweep` run in `make test-all` only. Of a law (tests/laws) every machine file keeps
 a member in `make test`, which laws/test_quick_members.py checks. Members with the marker `long` too
-run in `make test-all`, but not in the CI, which has an hour.
+run in `make test-all`, but not in the CI, which has an hour. On a slow machine even the rest of the
+sweeps takes longer than that: beyond the time that it is given the CI skips them, and says so.
 """
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
@@ -15,6 +18,9 @@ import pytest
 
 sweep = pytest.mark.sweep
 long = pytest.mark.long
+
+UNTIL = "TRUEPOSE_SWEEPS_UNTIL"
+"""Variable of the environment: s since 1970, after which members of sweeps are skipped."""
 
 Member = tuple[str, str | None, bool]
 """A test with its file, the member's id in brackets or None, and whether it is marked `sweep`."""
@@ -26,6 +32,13 @@ COLLECTED = pytest.StashKey[list[Member]]()
 def member_of(item: pytest.Item) -> Member:
     test, _, rest = item.nodeid.partition("[")
     return test, rest.removesuffix("]") or None, item.get_closest_marker("sweep") is not None
+
+
+def skip_beyond_time(item: pytest.Item) -> None:
+    """Skip a member of a sweep where the time that sweeps are given is over."""
+    ends = os.environ.get(UNTIL)
+    if ends and time.time() > float(ends) and item.get_closest_marker("sweep") is not None:
+        pytest.skip("the time that this run gives to sweeps is over")
 
 
 def thinned(members: Iterable[Any], quick: Collection[Any] | None = None) -> list[Any]:

@@ -161,7 +161,6 @@ site-release: package tools ## the same, and refuse results of tests that are no
 
 .PHONY: lock
 lock: tools ## resolve requirements.lock anew from pyproject.toml, and what wheels are built with
-	$(BIN)/python -m pip install --quiet uv
 	$(COMPILE) --all-extras --output-file requirements.lock pyproject.toml
 	$(COMPILE) --output-file release/requirements.txt release/requirements.in
 
@@ -225,6 +224,8 @@ distclean: clean ## remove the virtual environment too
 PYTEST := TRUEPOSE_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest \
 	--numprocesses=auto --dist=loadfile --no-loadscope-reorder
 
+UV := 0.13.9
+
 # Pins of what is locked, and hashes of all files that a pin has.
 COMPILE := $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 	--custom-compile-command "make lock"
@@ -281,6 +282,8 @@ $(KLIPPER): $(MADE) tests/klipper/install.py tests/klipper/environment.txt tests
 	$(BIN)/python tests/klipper/install.py $(dir $@)
 	@touch $@
 
+# By uv, which takes seconds where pip takes minutes.
 $(TOOLS): $(MADE) requirements.lock
-	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet uv==$(UV)
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes --requirement requirements.lock
 	@touch $@

@@ -62,7 +62,8 @@ if TYPE_CHECKING:
     click.option(
         "--quantities",
         metavar="NAMES",
-        help="What is computed of each variant: error, verdict, shares, coverage (slower).  "
+        help="What is computed of each variant: error, verdict, shares, coverage (slower), "
+        "kinematics.  "
         "[default: error,verdict,shares]",
     ),
     click.option(

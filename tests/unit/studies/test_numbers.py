@@ -17,6 +17,7 @@ from truepose._kernel import instruction_set
 from truepose.files.ratio import read_ratio
 from truepose.studies import study as studies
 from truepose.studies.block import BlockTask, evaluate_block
+from truepose.studies.constraints import Constraints
 from truepose.studies.quantities import QUICK_NAMES, SOURCE_NAMES
 from truepose.verdict.answer import STATES
 from truepose.verdict.coverage import QUICK, QUICK_DRAWS, QUICK_POSES
@@ -120,7 +121,7 @@ def prepared(path: Path, vary: list[str], **asked: Any) -> studies.PreparedStudy
 def task_of(study: studies.PreparedStudy) -> BlockTask:
     plan = study.plan()
     variants = tuple(plan.of_variant(row) for row in range(len(plan)))
-    return BlockTask(0, study.base, variants, study.quantities, 1.0, instruction_set())
+    return BlockTask(0, study.base, variants, study.quantities, Constraints(), instruction_set())
 
 
 def test_a_block_needs_no_file_and_is_the_same_wherever_it_is(

@@ -36,5 +36,6 @@ def test_designs_and_limits_stand_on_the_page() -> None:
     assert f"at most {MOST_VARIANTS:,} variants" in PAGE
     for quantity in REGISTRY:
         if not quantity.quick:
-            assert f"`{quantity.name}` is Monte Carlo" in PAGE
+            assert f"| `{quantity.name}` |" in PAGE
+    assert "`coverage` is Monte Carlo" in PAGE
     assert "coverage" not in QUICK_NAMES

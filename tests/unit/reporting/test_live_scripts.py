@@ -29,7 +29,8 @@ UNITS = {
 # Of a document so much as the table asks for; what is put in a cell is its text.
 DOCUMENT = """
 function element(name, attributes, ...content) {
-  return {attributes, content, dataset: {}, append(...more) { this.content.push(...more); },
+  return {attributes, content, dataset: {}, get children() { return this.content; },
+          append(...more) { this.content.push(...more); },
           replaceChildren(...rows) { this.content = rows; }};
 }
 function put(cell, value, text) { cell.text = text; }

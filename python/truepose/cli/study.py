@@ -63,8 +63,7 @@ if TYPE_CHECKING:
         "--quantities",
         metavar="NAMES",
         help="What is computed of each variant: error, verdict, shares, coverage (slower), "
-        "kinematics.  "
-        "[default: error,verdict,shares]",
+        "kinematics.  [default: error,verdict,shares]",
     ),
     click.option(
         "--reach",

@@ -166,10 +166,10 @@ def study(
     `{"strut.*.stiffness": "30:120:4 N/um", "strut.*.material": "steel,invar"}` or a list of
     "KEY=VALUES" (docs/studies.md). `design`: "factorial", or "latin-hypercube" or "sobol" with a
     `count` of variants and a `seed`. `settings`: changes that all variants have. `quantities`: what
-    is computed, of "error", "verdict", "shares", "coverage". A variant that has less than the share
-    `reach` of the poses of the base file is infeasible, and has no numbers; so is one whose
-    `conditioning` (0 to 1) is worse at a pose, or one of whose drives has less than the share
-    `travel_left` of its travel to either end, where these are given.
+    is computed, of "error", "verdict", "shares", "coverage", "kinematics". A variant that has less
+    than the share `reach` of the poses of the base file is infeasible, and has no numbers; so is
+    one whose `conditioning` (0 to 1) is worse at a pose, or one of whose drives has less than the
+    share `travel_left` of its travel to either end, where these are given.
 
     `minimise`: an optimiser draws the variants, `count` of them, that make a number small: "error",
     "known", "coverage-before" or "coverage-after". All variables go from one end to the other then,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,8 +11,11 @@ import pytest
 import truepose as tp
 from command_line import PLANAR, call
 from sweeps import sweep
+from truepose.studies.block import BlockTask
+from truepose.studies.constraints import Constraints
+from truepose.studies.minimise import Minimised
 from truepose.studies.objectives import OBJECTIVES
-from truepose.studies.optimiser import generation_of
+from truepose.studies.optimiser import generation_of, search
 from truepose.studies.ranking import objective_of, ranked
 
 Capture = pytest.CaptureFixture[str]
@@ -187,6 +190,43 @@ def test_bad_requests(more: dict[str, Any], code: str) -> None:
     asked = {"count": 24, "vary": RODS, **more}
     with pytest.raises(tp.errors.RequestError, match=code):
         tp.study(PLANAR, asked.pop("vary"), **asked)
+
+
+def test_the_optimiser_is_told_which_of_two_is_worse() -> None:
+    """Any that is feasible is better than any that is not, and nothing worse than no machine."""
+    constraints = Constraints(1.0, conditioning=0.2, travel_left=0.1)
+    template = BlockTask(0, cast("Any", None), (), ("error", "kinematics"), constraints, "scalar")
+    of = Minimised(OBJECTIVES["error"], (), 0, 0, template)
+    variants = {
+        "status": np.array(["ok", "ok", *["infeasible"] * 4, "failed"], object),
+        "linear_maximum": np.array([1e-5, 2e-3, *[np.nan] * 5])[:, np.newaxis],
+        "reach": np.array([1.0, 1.0, 1.0, 1.0, 0.9, 0.1, np.nan]),
+        "conditioning": np.array([0.3, 0.3, 0.19, 0.02, np.nan, np.nan, np.nan]),
+        "travel_left": np.array([0.2, 0.2, 0.2, 0.2, np.nan, np.nan, np.nan]),
+    }
+    told = of.value_of(variants)
+    assert np.isfinite(told).all()
+    assert (np.diff(told) > 0.0).all()
+    assert told[:2].tolist() == [1e-5, 2e-3]
+
+
+@pytest.mark.parametrize("count", [64, 97])
+def test_a_search_finds_the_bottom_of_a_valley_with_a_kink(count: int) -> None:
+    """Of a function of two variables whose least is known, in just so many evaluations."""
+    asked: list[Any] = []
+
+    def ask(shares: Any) -> Any:
+        asked.append(shares.copy())
+        return np.abs(shares[:, 0] - 0.3) + 2.0 * np.abs(shares[:, 1] - shares[:, 0] - 0.2)
+
+    search(ask, 2, count, 7)
+    points = np.concatenate(asked)
+    assert points.shape == (count, 2)
+    assert ((points >= 0.0) & (points <= 1.0)).all()
+    found = points[ask(points).argmin()]
+    assert np.abs(found - [0.3, 0.5]).max() < 0.05
+    first = asked[0]
+    assert ask(points).min() < 0.5 * ask(first).min()
 
 
 def test_a_generation_is_as_large_as_its_variables_need() -> None:

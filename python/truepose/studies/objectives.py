@@ -45,11 +45,11 @@ OBJECTIVES = {
         Objective("known", "error", "known", (0,), "known error of the position"),
         *(
             Objective(
-                f"coverage-{state}",
+                f"coverage-{state.partition(' ')[0]}",
                 "coverage",
                 "coverage_95",
                 (at, 0),
-                f"position error that 95 % of all machines stay below, {state} compensation",
+                f"position error that 95 % of all machines stay below, {state}",
             )
             for at, state in enumerate(STATES)
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,6 +12,7 @@ import pytest
 import truepose as tp
 from command_line import PLANAR, call
 from sweeps import sweep
+from truepose.cli import study as command
 from truepose.studies.block import BlockTask
 from truepose.studies.constraints import Constraints
 from truepose.studies.minimise import Minimised
@@ -169,6 +171,15 @@ def test_each_objective_is_what_the_best_are_chosen_by(name: str) -> None:
     assert objective.name == name
     order = ranked(study)
     assert (np.diff(objective.of(study)[order]) >= 0.0).all()
+
+
+def test_every_objective_is_named_where_people_look() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "studies.md").read_text("utf-8")
+    (option,) = (one for one in command.command.params if one.name == "minimise")
+    for name in OBJECTIVES:
+        assert f"`{name}`" in page
+        assert re.search(rf"[ ,]{name}[,.]", getattr(option, "help", ""))
+        assert f'"{name}"' in str(tp.study.__doc__)
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from truepose.errors import TrueposeError
+from truepose.errors import Problem, TrueposeError
 from truepose.language import spoken
 from truepose.studio import messages, report_page
 from truepose.studio.access import Access
@@ -55,6 +56,8 @@ MOST_QUOTED = 1000
 FORBIDDEN, TOO_LARGE, UNPROCESSABLE = 403, 413, 422
 GOING, TOO_SLOW = 1001, 1013
 """Codes with which a WebSocket is closed."""
+GONE = (WebSocketDisconnect, asyncio.CancelledError, KeyError, RuntimeError, OSError)
+"""What a WebSocket raises where its page is gone."""
 
 HEADERS = {
     "Cache-Control": "no-store",
@@ -155,9 +158,11 @@ class Studio:
         # and several would each keep the most that they ever had. A report is waited for apart.
         self._maker = ThreadPoolExecutor(1, "making")
         self._reporter = ThreadPoolExecutor(1, "report")
-        self._given: asyncio.Queue[Given] = asyncio.Queue()
+        self.given: asyncio.Queue[Given] = asyncio.Queue()
+        """Answers that are to be told."""
         self._evaluation: Evaluator | None = None
         self._tasks: list[asyncio.Task[None]] = []
+        self._taking: set[asyncio.Task[None]] = set()
         self._process: Any = None
         self._stopped = False
         self.not_kept = ""
@@ -165,7 +170,7 @@ class Studio:
             Route("/", self._page, methods=["GET"]),
             Route("/report", self._report, methods=["GET"]),
             Route("/files", self._drop, methods=["POST"]),
-            WebSocketRoute("/socket", self._socket),
+            WebSocketRoute("/socket", self.conversation),
         ]
         self.app: Asgi = Guarded(Starlette(routes=routes), access)
 
@@ -176,10 +181,10 @@ class Studio:
 
         def tell(given: Given) -> None:
             with suppress(RuntimeError):  # the loop is closed: the studio ends
-                loop.call_soon_threadsafe(self._given.put_nowait, given)
+                loop.call_soon_threadsafe(self.given.put_nowait, given)
 
         self._evaluation = Evaluator(tell)
-        self._tasks = [asyncio.create_task(self._hand_on()), asyncio.create_task(self._watch())]
+        self._tasks = [asyncio.create_task(self.hand_on()), asyncio.create_task(self._watch())]
         await self._keep()
 
     def stop(self) -> None:
@@ -187,6 +192,11 @@ class Studio:
         self._stopped = True
         if self._process is not None:
             self._process.kill()
+
+    @property
+    def open_windows(self) -> int:
+        """How many pages it talks with."""
+        return len(self._windows)
 
     def _note_process(self, process: Any) -> None:
         self._process = process
@@ -239,7 +249,8 @@ class Studio:
         answer = {"file": number, "name": name, "size": len(content)}
         return JSONResponse(answer, headers=HEADERS)
 
-    async def _socket(self, page: WebSocket) -> None:
+    async def conversation(self, page: WebSocket) -> None:
+        """Talk with a page, until it is gone."""
         await page.accept()
         window = _Window(self._next, page)
         self._next += 1
@@ -256,7 +267,8 @@ class Studio:
             for task in tasks:
                 task.cancel()
             for ended in await asyncio.gather(*tasks, return_exceptions=True):
-                _note_defect(ended)
+                if isinstance(ended, BaseException) and not isinstance(ended, GONE):
+                    _noted_defect(ended)
             async with self._lock:
                 self.session.left(window.number)
 
@@ -264,16 +276,30 @@ class Studio:
         """Take what a window says, one after the other."""
         while True:
             text, message = await window.next_said()
-            async with self._lock:
-                try:
-                    if isinstance(message, TrueposeError):
-                        raise message
-                    told = await asyncio.to_thread(self.session.receive, message, window.number)
-                except TrueposeError as failure:
-                    self._tell([window], [refused(text[:MOST_QUOTED], failure)])
-                else:
-                    self._tell([window], told.sender)
-                    await self._told(told)
+            # To its end even where the window goes meanwhile: else the state is changed by a thread
+            # that nobody waits for, and no other window is told of it.
+            taking = asyncio.create_task(self._take(window, text, message))
+            self._taking.add(taking)
+            taking.add_done_callback(self._taking.discard)
+            await asyncio.shield(taking)
+
+    async def _take(
+        self, window: _Window, text: str, message: messages.Received | TrueposeError
+    ) -> None:
+        """Take one message of a window: it is told the answer, all are told what changed."""
+        async with self._lock:
+            try:
+                if isinstance(message, TrueposeError):
+                    raise message
+                told = await asyncio.to_thread(self.session.receive, message, window.number)
+                self._tell([window], told.sender)
+                await self._told(told)
+            except TrueposeError as failure:
+                self._tell([window], [refused(text[:MOST_QUOTED], failure)])
+            except Exception as defect:
+                problems = [_noted_defect(defect)]
+                said = {"type": "refused", "of": text[:MOST_QUOTED], "problems": problems}
+                self._tell([window], [said])
 
     # --- what is told
 
@@ -302,15 +328,22 @@ class Studio:
             self._tell_everyone([self.session.computing()])
             self._evaluation.ask(job)
 
-    async def _hand_on(self) -> None:
+    async def hand_on(self) -> None:
         """Tell windows what was worked out."""
         while True:
-            given = await self._given.get()
+            given = await self.given.get()
             async with self._lock:
-                for numbers, message in self.session.given(given):
-                    windows = self._windows
-                    chosen = windows if numbers is None else [n for n in numbers if n in windows]
-                    self._tell([windows[number] for number in chosen], [message])
+                try:
+                    self._give(given)
+                except Exception as defect:
+                    self._give(replace(given, value=None, problems=[_noted_defect(defect)]))
+
+    def _give(self, given: Given) -> None:
+        """Tell an answer to whom it is for."""
+        for numbers, message in self.session.given(given):
+            windows = self._windows
+            chosen = windows if numbers is None else [n for n in numbers if n in windows]
+            self._tell([windows[number] for number in chosen], [message])
 
     async def _watch(self) -> None:
         """See the machine file change on the disk."""
@@ -324,7 +357,10 @@ class Studio:
             seen, read = looks, file
             digest = await asyncio.to_thread(_digest, path)
             async with self._lock:
-                await self._told(self.session.file_is(digest))
+                try:
+                    await self._told(self.session.file_is(digest))
+                except Exception as defect:
+                    _noted_defect(defect)
 
     async def _keep(self) -> None:
         """Write what outlives the studio."""
@@ -337,15 +373,16 @@ class Studio:
             self.not_kept = failure.strerror or str(failure)
 
 
-def _note_defect(ended: object) -> None:
-    """Say on stderr where a conversation ended by a fault of ours, in a line."""
-    gone = (WebSocketDisconnect, asyncio.CancelledError, KeyError, RuntimeError, OSError)
-    if isinstance(ended, BaseException) and not isinstance(ended, gone):
-        what = " ".join(str(ended).split())[:200]
-        sys.stderr.write(
-            f"Error: this is a defect of truepose {version()}, not of your input: "
-            f"{type(ended).__name__} ({what}).\n"
-        )
+def _noted_defect(defect: BaseException) -> dict[str, Any]:
+    """Say on stderr, in a line, that we are at fault, and the same for a page, as a problem.
+
+    Its code is no `Problem`'s: those are of input, and each has an explanation.
+    """
+    what = f"{type(defect).__name__} ({' '.join(str(defect).split())[:200]})"
+    sentence = f"this is a defect of truepose {version()}, not of your input"
+    sys.stderr.write(f"Error: {sentence}: {what}.\n")
+    unsaid = dict.fromkeys(field.name for field in fields(Problem))
+    return {**unsaid, "code": "defect", "message": sentence, "found": what}
 
 
 def _looks(path: Path) -> str:

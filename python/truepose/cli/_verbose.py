@@ -111,7 +111,7 @@ def say_machine(machine: Machine) -> None:
     if machine.settings:
         say("settings: " + ", ".join(f"{key}={text}" for key, text in machine.settings.items()))
     if machine.workspace is not None:
-        say(f"workspace: {counted(len(machine.poses()), 'pose')}")
+        say(f"workspace: {counted(machine.workspace.n_pose, 'pose')}")
     names = [source.name for source in acting(machine)]
     say(f"sources: {', '.join(names) or 'none that acts'}")
 

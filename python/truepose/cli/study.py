@@ -152,7 +152,7 @@ def command(
     from truepose.studies.evaluators import evaluator_of
     from truepose.studies.quantities import QUICK_NAMES
 
-    cluster = requested_cluster(workers, scheduler, tls)
+    cluster = requested_cluster(workers, scheduler, tls, told)
     request = Request(**options)
     output = request.output
     if (output is None) is not dry_run:
@@ -201,7 +201,7 @@ def command(
             f"{output}: {done:,} of {counted(total, 'variant')} are done, going on", err=True
         )
 
-    with evaluator_of(cluster, told) as evaluator, progress("study", "variants") as report:
+    with evaluator_of(cluster) as evaluator, progress("study", "variants") as report:
         result = studies.run(
             prepared, output, evaluator=evaluator, progress=report, going_on=going_on
         )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -17,17 +19,33 @@ TLS_FILES = {"ca": "ca.pem", "certificate": "cert.pem", "key": "key.pem"}
 _ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:]+\]|[\w.-]+):\d{1,5}")
 
 
+Told = Callable[[str], None]
+"""Called with a sentence on a worker that is refused."""
+
+
+def warned(text: str) -> None:
+    """Tell as Python warns."""
+    warnings.warn(text, stacklevel=2)
+
+
 @dataclass(frozen=True)
 class ClusterOptions:
-    """So many `workers` on this computer, or those of a `scheduler`; `tls`: the folder for it."""
+    """So many `workers` on this computer, or those of a `scheduler`; `tls`: the folder for it.
+
+    `told`: who hears of workers that are given no work.
+    """
 
     workers: int | None = None
     scheduler: str | None = None
     tls: Path | None = None
+    told: Told = field(default=warned, compare=False)
 
 
 def requested_cluster(
-    workers: int | None, scheduler: str | None, tls: str | Path | None
+    workers: int | None,
+    scheduler: str | None,
+    tls: str | Path | None,
+    told: Told = warned,
 ) -> ClusterOptions | None:
     """What is asked for, or None where this process computes.
 
@@ -51,7 +69,7 @@ def requested_cluster(
                 hint="pip install 'truepose[cluster]'",
             )
         )
-    return ClusterOptions(workers, scheduler, folder)
+    return ClusterOptions(workers, scheduler, folder, told)
 
 
 def _of_number(workers: int | None, scheduler: str | None) -> list[Problem]:
@@ -126,4 +144,4 @@ def _of_folder(folder: Path) -> list[Problem]:
     ]
 
 
-__all__ = ["TLS_FILES", "ClusterOptions", "requested_cluster"]
+__all__ = ["TLS_FILES", "ClusterOptions", "Told", "requested_cluster"]

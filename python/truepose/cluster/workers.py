@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from truepose._kernel import instruction_set
 from truepose.cluster.in_worker import Greeting, greet, versions
 from truepose.cluster.instruction_sets import has, least
-from truepose.cluster.options import TLS_FILES, ClusterOptions
+from truepose.cluster.options import TLS_FILES, ClusterOptions, Told
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import counted
 
@@ -30,9 +30,6 @@ ANSWER = 10.0
 
 NAMED = 8
 """Workers that a message names."""
-
-Told = Callable[[str], None]
-"""Called with a sentence on a worker that is refused."""
 
 _FAILURES = (OSError, RuntimeError, TypeError, ValueError)
 """What dask.distributed raises where nobody answers, or not as it should."""
@@ -196,12 +193,13 @@ class Workers:
 
 
 @contextmanager
-def connected(options: ClusterOptions, told: Told) -> Iterator[Workers]:
+def connected(options: ClusterOptions) -> Iterator[Workers]:
     """Workers that are started for what is done inside, or those of a scheduler.
 
     Raises `RequestError`: no-scheduler, no-worker.
     """
     import dask
+    import distributed  # noqa: F401  first: as it comes it completes the configuration set here
 
     quiet = {
         "distributed.comm.timeouts.connect": f"{ANSWER:g}s",
@@ -219,7 +217,7 @@ def connected(options: ClusterOptions, told: Told) -> Iterator[Workers]:
         else:
             client = stack.enter_context(_answering(options))
             place = f"the scheduler {options.scheduler}"
-        yield Workers(client, place, told)
+        yield Workers(client, place, options.told)
 
 
 @contextmanager
@@ -329,4 +327,4 @@ def _short(failure: BaseException) -> str:
     return text if len(text) <= 200 else f"{text[:197]}..."
 
 
-__all__ = ["Told", "Workers", "connected", "gone"]
+__all__ = ["Workers", "connected", "gone"]

@@ -324,8 +324,9 @@ class ActualMachine:
 
 
 def _requested(block: PoseBlock) -> Floats:
-    if block.indices.size == len(block.requested):
-        return block.requested
+    requested = block.requested
+    if isinstance(requested, np.ndarray) and block.indices.size == len(requested):
+        return requested
     return block.requested[block.indices]
 
 

@@ -84,7 +84,7 @@ def limbs(machine: Machine, controller: str, kind: str) -> list[DeltaLimb]:
     if not has_joints(status)[0]:
         left_out = SkippedPoses()
         left_out.add(np.zeros(1, np.intp), status)
-        raise no_pose_left(machine, home[np.newaxis, :], left_out, of_file=True)
+        raise no_pose_left(machine, home[np.newaxis, :], left_out.counts(), of_file=True)
     centres = machine.kernel.joint_centres(joints, placements)[0]
     number = 2 if len(machine.dof) > 3 else 1
     delta_limbs = []

@@ -386,7 +386,7 @@ def _usable(machine: Machine, actual: ActualMachine) -> tuple[Floats, int]:
     walk = PoseRun(machine, table, actual.condition)
     kept = [table[block.indices] for block in walk]
     if not kept:
-        raise no_pose_left(machine, table, walk.left_out, of_file=True)
+        raise no_pose_left(machine, table, walk.left_out.counts(), of_file=True)
     poses = np.concatenate(kept)
     return poses, len(table) - len(poses)
 

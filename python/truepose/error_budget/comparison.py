@@ -6,6 +6,8 @@ source alone can make it (`budget.largest`), be it a band or known.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from truepose.arrays import Floats, Indices
@@ -41,20 +43,37 @@ class LengthStatistics:
     """Running highest and root mean square of the largest error, a source and quantity."""
 
     def __init__(self, n_source: int, n_quantity: int) -> None:
-        self._squares = np.zeros((n_source, n_quantity))
+        self._joined = np.zeros((n_source, n_quantity))
+        self._squares: list[Floats] = []
         self._count = 0
         self.highest: Floats = np.zeros((n_source, n_quantity))
 
     def add(self, lengths: Floats) -> None:
-        """`lengths` (n, n_source, n_quantity) of more poses."""
+        """`lengths` (n, n_source, n_quantity) of a block more."""
         self._count += len(lengths)
-        self._squares += np.square(lengths).sum(axis=0)
+        self._squares.append(np.square(lengths).sum(axis=0))
         np.maximum(self.highest, lengths.max(axis=0, initial=0.0), out=self.highest)
+
+    def join(self, later: LengthStatistics) -> None:
+        """Those of the blocks that follow; rounded as if all had been added here.
+
+        Sums of blocks are kept apart until then: where others add them up the bits differ.
+        """
+        self._joined = self._total(later._squares)
+        self._squares = []
+        self._count += later._count
+        np.maximum(self.highest, later.highest, out=self.highest)
+
+    def _total(self, more: Sequence[Floats] = ()) -> Floats:
+        total = self._joined.copy()
+        for squares in (*self._squares, *more):
+            total += squares
+        return total
 
     @property
     def rms(self) -> Floats:
         """(n_source, n_quantity) m and rad."""
-        mean: Floats = np.sqrt(self._squares / max(self._count, 1))
+        mean: Floats = np.sqrt(self._total() / max(self._count, 1))
         return mean
 
 

@@ -5,18 +5,22 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.error_budget import bands, comparison, in_kernel
-from truepose.error_budget.guide_loads import GuideLoads
+from truepose.arrays import Flags
+from truepose.cluster.options import requested_cluster
+from truepose.error_budget import bands, in_kernel
+from truepose.error_budget.tally import Tally
+from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs import percent
 from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, label, quantity_coords
-from truepose.runs.poses import Progress, of_band
+from truepose.runs.poses import PoseRun, Progress, of_band
 from truepose.runs.quantities import quantities
 from truepose.runs.run import Run
 from truepose.runs.variables import variables_of
@@ -99,18 +103,6 @@ SCHEMA: Schema = {
     "verdict": Variable(("source",), "1", "negligible, relevant or dominant", str),
 }
 
-# What is highest over poses, and of which variable.
-_HIGHEST = {
-    "highest_lower": "error_lower",
-    "highest_upper": "error_upper",
-    "highest_percent_lower": "percent_lower",
-    "highest_percent_upper": "percent_upper",
-    "overall_highest_lower": "overall_error_lower",
-    "overall_highest_upper": "overall_error_upper",
-    "overall_highest_percent_lower": "overall_percent_lower",
-    "overall_highest_percent_upper": "overall_percent_upper",
-}
-
 
 @checked
 def budget(
@@ -118,6 +110,10 @@ def budget(
     poses: ArrayLike | None = None,
     condition: Condition | None = None,
     *,
+    summary: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    tls: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """The error over the workspace, or at `poses`, from each source alone and from all together.
@@ -128,10 +124,32 @@ def budget(
     docs/results.md; errors are actual minus commanded, base frame (Gojtan & Hess-Coelho 2005,
     equations 3-7; equation 8 for the percent of a source, 9 for that of all together).
 
-    Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left; `TrueposeError` where
-    the condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
+    `summary`: what is highest over all poses, where, and how the sources compare, without any
+    variable over poses: of a grid in the file there may be 1e10 then. `workers`: so many processes
+    of this computer evaluate it, or those of the dask.distributed `scheduler` at "tcp://HOST:PORT",
+    or "tls://HOST:PORT" and `tls`, a folder with ca.pem, cert.pem and key.pem; the numbers are the
+    same (docs/scale.md).
+
+    Raises `RequestError`: bad-poses, no-workspace, grid-too-large, no-source, no-pose-left,
+    bad-workers, no-scheduler, no-worker, worker-lost, extra-missing; `TrueposeError` where the
+    condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
     of (guide-taken-rigid) is in the attribute `warnings`.
     """
+    cluster = requested_cluster(workers, scheduler, tls)
+    if summary:
+        from truepose.error_budget.summary import summary as summary_of
+
+        return summary_of(machine, poses, condition, progress, cluster)
+    if cluster is not None:
+        raise RequestError(
+            Problem(
+                "bad-workers",
+                "workers are for a summary: rows of single poses take longer to send than to "
+                "compute",
+                found=f"{cluster.workers or cluster.scheduler} without a summary",
+                expected="--summary, summary=True",
+            )
+        )
     return evaluate(machine, poses, condition, progress).dataset()
 
 
@@ -170,49 +188,30 @@ def evaluate(
 ) -> Evaluation:
     """The work of `budget`, with its arguments and its errors."""
     run = Run(machine, poses, condition, progress)
-    sources = run.sources
-    kinds = quantities(machine.components)
-    lengths = {"source": len(sources), "component": len(machine.components)}
-    rows = run.begin(SCHEMA, source=len(sources))
-    highest = {
-        name: comparison.Highest(tuple(lengths[dim] for dim in SCHEMA[name].dims))
-        for name in _HIGHEST
-    }
-    statistics = comparison.LengthStatistics(len(sources), len(kinds))
-    guides = GuideLoads(machine)
-    distributions: list[dict[str, None]] = [{} for _ in sources]
-
+    rows = run.begin(SCHEMA, source=len(run.sources))
+    tally = Tally(machine, len(run.sources))
     for block in run:
-        deviations = [source.deviation(machine, run.condition, block) for source in sources]
-        for names, deviation in zip(distributions, deviations, strict=True):
-            names.update((str(deviation.distribution[k]), None) for k in deviation.banded)
         values = rows.room(block.indices.size)
-        filled, statuses = _evaluate(machine, block, sources, deviations, values)
-        usable = run.fill(block, values, *statuses)
-        if usable.any():
-            every = bool(usable.all())
-            for name, running in highest.items():
-                if every:
-                    running.raise_to(filled.highest[_HIGHEST[name]])
-                else:
-                    running.add(values[_HIGHEST[name]][usable])
-            statistics.add(values["largest"] if every else values["largest"][usable])
-            guides.add(block, usable)
+        rows.append(block, values, evaluate_block(run, run.sources, block, values, tally))
     if rows.count == 0:
         raise run.no_pose_left()
+    return Evaluation(run, tally.over_all(), tally.distributions(), tally.warnings())
 
-    shares = comparison.share(statistics.highest[:, 0])
-    over_all: dict[str, Any] = {name: running.value for name, running in highest.items()}
-    over_all |= {
-        "highest": statistics.highest,
-        "rms": statistics.rms,
-        "share": shares,
-        "rank": comparison.rank(shares),
-        "verdict": comparison.verdict(statistics.highest, kinds, machine.accuracy),
-    }
-    return Evaluation(
-        run, over_all, [" / ".join(names) or "none" for names in distributions], guides.warnings()
-    )
+
+def evaluate_block(
+    run: PoseRun,
+    sources: Sequence[Source],
+    block: PoseBlock,
+    values: dict[str, np.ndarray],
+    tally: Tally,
+) -> Flags:
+    """Fill `values`, every variable over poses, for one block; which of them can be used, (n,)."""
+    deviations = [source.deviation(run.machine, run.condition, block) for source in sources]
+    tally.note(deviations)
+    filled, statuses = _evaluate(run.machine, block, sources, deviations, values)
+    usable = run.keep(block.indices, *statuses)
+    tally.add(block, values, filled.highest, usable)
+    return usable
 
 
 def _evaluate(
@@ -249,4 +248,4 @@ def _evaluate(
     return filled, [*statuses, of_band(filled.edges)]
 
 
-__all__ = ["SCHEMA", "Evaluation", "budget", "evaluate"]
+__all__ = ["SCHEMA", "Evaluation", "budget", "evaluate", "evaluate_block"]

@@ -46,6 +46,11 @@ class GuideLoads:
             self._highest[at] = max(self._highest[at], highest)
         self._acting = max(self._acting, float(all_that_acts(block).max()))
 
+    def join(self, later: GuideLoads) -> None:
+        """Those of other poses of the same machine."""
+        np.maximum(self._highest, later._highest, out=self._highest)
+        self._acting = max(self._acting, later._acting)
+
     def warnings(self) -> list[dict[str, str]]:
         """One warning, its code and sentence, where a guide carries anything; else none."""
         loaded = [

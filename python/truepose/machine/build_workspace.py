@@ -28,6 +28,7 @@ from truepose.machine.tables.workspace import (
 from truepose.machine.validation import Validated
 from truepose.machine.workspace import (
     LARGEST_GRID,
+    MOST_POSES,
     GridAxis,
     Workspace,
     along,
@@ -61,16 +62,18 @@ def workspace(
     return workspace, home
 
 
-def too_large(document: Document, size: float, key: Key) -> Problem | None:
+def too_large(
+    document: Document, size: float, key: Key, most: int = LARGEST_GRID
+) -> Problem | None:
     """The problem of so many poses, asked for at `key`, if they are too many."""
-    if size <= LARGEST_GRID:
+    if size <= most:
         return None
     return document.problem(
         Fault(
             "grid-too-large",
             "more poses than are allowed",
             found=f"{size:.3g} poses" if size < 1e300 else "more than 1e300 poses",
-            expected=f"at most {LARGEST_GRID:.0e} poses".replace("e+0", "e"),
+            expected=f"at most {most:.0e} poses".replace("e+0", "e").replace("e+", "e"),
         ),
         key,
     )
@@ -142,7 +145,7 @@ class _Making:
     def _box(self, table: BoxTable | None) -> tuple[GridAxis, ...] | None:
         axes = self._filled(table, self.commanded)
         size = math.prod(float(axis.count) for axis in axes)
-        return None if self._refused(size, ("workspace", "box")) else axes
+        return None if self._refused(size, ("workspace", "box"), LARGEST_GRID) else axes
 
     def _cylinder(self, table: CylinderTable | None) -> Floats | None:
         assert table is not None
@@ -242,8 +245,8 @@ class _Making:
             )
         )
 
-    def _refused(self, size: float, key: Key) -> bool:
-        problem = too_large(self.document, size, key)
+    def _refused(self, size: float, key: Key, most: int = MOST_POSES) -> bool:
+        problem = too_large(self.document, size, key, most)
         if problem is not None:
             self.problems.append(problem)
         return problem is not None

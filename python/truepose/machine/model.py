@@ -35,7 +35,7 @@ from truepose.machine.limbs import Limb
 from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.controller import Holds
-from truepose.machine.workspace import Accuracy, Workspace
+from truepose.machine.workspace import MOST_POSES, Accuracy, PoseTable, Workspace
 from truepose.representation import Facts, Represented
 
 if TYPE_CHECKING:
@@ -160,13 +160,12 @@ class Machine(Represented):
         """Between which coordinates the workspace lies, and how many poses there are of it."""
         if self.workspace is None:
             return None
-        poses = self.workspace.poses()
         ends = []
-        for name, least, most in zip(self.commanded, poses.min(0), poses.max(0), strict=True):
+        for name, least, most in zip(self.commanded, *self.workspace.ends, strict=True):
             unit = self.shown.pose(name)
             first, last = (f"{value * unit.per_si:.6g}" for value in (least, most))
             ends.append(f"{name} {first} to {last} {unit.label}")
-        return f"{', '.join(ends)}: {counted(len(poses), 'pose')}"
+        return f"{', '.join(ends)}: {counted(self.workspace.n_pose, 'pose')}"
 
     def plot(self, figure: str | None = None) -> Plotted:
         """A figure of its report, which shows itself in a notebook.
@@ -305,6 +304,30 @@ class Machine(Represented):
     def poses(self) -> Floats:
         """(n_pose, n_commanded) the poses of the file's workspace, first axis fastest, SI.
 
+        Raises `RequestError`: no-workspace where the file gives none, grid-too-large where it gives
+        more than are kept at once.
+        """
+        count = len(self.pose_table())
+        assert self.workspace is not None
+        if count > MOST_POSES:
+            raise RequestError(
+                Problem(
+                    "grid-too-large",
+                    "more poses than are evaluated one by one",
+                    self.file,
+                    line=self.workspace.line,
+                    path="workspace",
+                    found=f"{count:.3g} poses",
+                    expected=f"at most {MOST_POSES:.0e} poses".replace("e+0", "e"),
+                    hint="a coarser grid; of more poses there is a summary: truepose budget "
+                    "--summary, truepose.budget(machine, summary=True)",
+                )
+            )
+        return self.workspace.poses()
+
+    def pose_table(self) -> PoseTable:
+        """The poses of the file's workspace, any number of them, of a grid made as looked at.
+
         Raises `RequestError` (no-workspace) where the file gives none.
         """
         if self.workspace is None:
@@ -317,7 +340,7 @@ class Machine(Represented):
                     expected="a [workspace] with a grid or poses, or poses in the call",
                 )
             )
-        return self.workspace.poses()
+        return self.workspace.table()
 
     def compliances(self, lengths: ArrayLike) -> tuple[Indices, Floats]:
         """Parameters (k,) that may give way, and their compliance (n, k), m/N or rad/(N m).

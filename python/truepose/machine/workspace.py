@@ -10,8 +10,11 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.language import marked
 
-LARGEST_GRID = 10_000_000
-"""More poses are refused before anything is allocated."""
+MOST_POSES = 10_000_000
+"""More poses at once are refused before anything is allocated."""
+
+LARGEST_GRID = 10**10
+"""More poses of a grid are refused; those between are walked through a block at a time."""
 
 MOST_STEPS = 1e15
 """More steps are not told apart: they are far too many."""
@@ -60,11 +63,63 @@ class Workspace:
         """How many poses there are."""
         return math.prod(self.shape)
 
+    @property
+    def ends(self) -> tuple[Floats, Floats]:
+        """The least and the largest coordinate along each freedom, (n_commanded,) each."""
+        if self.listed is not None:
+            return self.listed.min(axis=0), self.listed.max(axis=0)
+        both = np.array([(axis.start, axis.stop) for axis in self.axes])
+        return both.min(axis=1), both.max(axis=1)
+
     def poses(self) -> Floats:
         """(n_pose, n_commanded): the first axis runs fastest."""
         if self.listed is not None:
             return self.listed.copy()
         return grid(self.axes)
+
+    def table(self) -> PoseTable:
+        """The same, of a grid each pose made where it is looked at."""
+        return GridPoses(self.axes) if self.listed is None else self.listed
+
+
+@dataclass(frozen=True)
+class GridPoses:
+    """The poses of a grid as a table that is never all there: rows are made as they are asked for.
+
+    To the bits of `grid`, however many rows there are.
+    """
+
+    axes: tuple[GridAxis, ...]
+
+    def __len__(self) -> int:
+        return math.prod(axis.count for axis in self.axes)
+
+    def __getitem__(self, rows: slice | int | np.integer | Indices) -> Floats:
+        """Rows (n, n_commanded), or one (n_commanded,); numbers count from 0, none from the end."""
+        if isinstance(rows, slice):
+            rows = np.arange(*rows.indices(len(self)), dtype=np.intp)
+        rest = np.asarray(rows, np.intp)
+        poses = np.empty((*rest.shape, len(self.axes)))
+        for column, axis in enumerate(self.axes):
+            rest, at = np.divmod(rest, axis.count)
+            poses[..., column] = _along(axis, at)
+        return poses
+
+
+PoseTable = Floats | GridPoses
+"""Poses (n_pose, n_commanded), SI, of which some rows at a time are looked at."""
+
+
+def _along(axis: GridAxis, numbers: Indices) -> Floats:
+    """Coordinates of steps of an axis, rounded as `numpy.linspace` rounds all of them."""
+    if axis.count == 1:
+        return np.full(numbers.shape, axis.start)
+    span = axis.stop - axis.start
+    step = span / (axis.count - 1)
+    ahead = numbers * step if step != 0.0 else numbers / (axis.count - 1) * span
+    values: Floats = np.asarray(ahead + axis.start)
+    values[numbers == axis.count - 1] = axis.stop
+    return values
 
 
 def grid(axes: tuple[GridAxis, ...]) -> Floats:

@@ -117,13 +117,17 @@ class Study:
     @cached_property
     def has_band(self) -> tuple[bool, ...]:
         """Per source: whether it can do more than its error at the shift, anywhere."""
-        wider = self.values("reach") > 0.0
-        return tuple(bool(wider[:, index].any()) for index in range(len(self.sources)))
+        # Of a summary, which has no poses, there is the highest alone.
+        summed = "highest_reach" in self.budget
+        reach = self.values("highest_reach" if summed else "reach").max(
+            axis=(-1,) if summed else (0, 2)
+        )
+        return tuple(bool(far > 0.0) for far in reach)
 
     @cached_property
     def n_pose(self) -> int:
         """Number of poses that were evaluated."""
-        return int(self.budget.sizes["pose"])
+        return int(self.budget.attrs["poses_used"])
 
     @cached_property
     def numbers(self) -> Indices:

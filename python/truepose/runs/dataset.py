@@ -140,10 +140,14 @@ def assemble(
     return labelled_dataset(data, labels, attrs)
 
 
-def region_dataset(
-    machine: Machine, condition: Condition, schema: Schema, values: Mapping[str, Any]
+def overall_dataset(
+    machine: Machine,
+    condition: Condition,
+    schema: Schema,
+    values: Mapping[str, Any],
+    coords: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
-    """The Dataset of a result over a continuous region, which has no dim pose."""
+    """The Dataset of a result that has no dim pose, as over a continuous region; more `coords`."""
     units = _units(machine)
     data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
@@ -152,6 +156,7 @@ def region_dataset(
         "commanded": label("commanded", list(machine.commanded), "commanded freedom"),
         "commanded_units": label("commanded", commanded_units(machine), "unit of the freedom"),
         **quantity_coords(machine),
+        **(coords or {}),
     }
     return labelled_dataset(data, labels, provenance(machine, condition))
 

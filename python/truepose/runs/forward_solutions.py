@@ -225,8 +225,7 @@ def _turns(machine: Machine) -> Floats:
 def _in_workspace(machine: Machine, poses: Floats) -> Flags | None:
     if machine.workspace is None:
         return None
-    table = machine.workspace.poses()
-    low, high = table.min(axis=0), table.max(axis=0)
+    low, high = machine.workspace.ends
     slack = ENDS * np.maximum(high - low, machine.characteristic_length)
     values = poses[:, [machine.dof.index(name) for name in machine.commanded]]
     return np.asarray(((values >= low - slack) & (values <= high + slack)).all(axis=1))

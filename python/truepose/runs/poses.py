@@ -13,7 +13,9 @@ Ctrl-C and progress in between two blocks, and is long enough for the kernel's l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +26,7 @@ from truepose.arrays import Flags, Floats, Indices, real_numbers
 from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.language import grouped, marked, say
 from truepose.machine import Condition, Machine
+from truepose.machine.workspace import PoseTable
 from truepose.sources import PoseBlock, Source, acting
 
 BLOCK = 8192
@@ -49,6 +52,11 @@ CORRECTION = "correction_"
 
 REASONS = (*STATUS, BAND, *(f"{CORRECTION}{name}" for name in STATUS))
 """Why a pose may be left out: a kernel status, or what a command found that looked further."""
+
+
+def requested_table(machine: Machine, poses: ArrayLike | None) -> PoseTable:
+    """As `requested_poses`, of a grid each pose made where it is looked at."""
+    return machine.pose_table() if poses is None else requested_poses(machine, poses)
 
 
 def requested_poses(machine: Machine, poses: ArrayLike | None) -> Floats:
@@ -117,6 +125,10 @@ class SkippedPoses:
             self.indices.append(indices)
             self.status.append(status)
 
+    def counts(self) -> Counter[str]:
+        """How many poses each reason leaves out."""
+        return Counter(self.sorted()[1].tolist())
+
     def sorted(self) -> tuple[Indices, np.ndarray]:
         """Numbers, ascending, and names of the status, both (n_left_out,)."""
         if not self.indices:
@@ -147,7 +159,7 @@ class PoseRun:
     def __init__(
         self,
         machine: Machine,
-        poses: Floats,
+        poses: PoseTable,
         condition: Condition,
         progress: Progress | None = None,
         *,
@@ -165,14 +177,33 @@ class PoseRun:
         self._travel = Travel(machine) if path else None
 
     def __iter__(self) -> Iterator[PoseBlock]:
-        total = len(self.poses)
+        return self.between(0, len(self.poses))
+
+    def between(self, start: int, stop: int) -> Iterator[PoseBlock]:
+        """The blocks of the poses from number `start`, a block's first, to before `stop`."""
         _keep_freed_memory()
-        for start in range(0, total, BLOCK):
-            block = self._block(start, self.poses[start : start + BLOCK])
+        for first in range(start, stop, BLOCK):
+            last = min(first + BLOCK, stop)
+            block = self._block(first, self.poses[first:last])
             if block.indices.size:
                 yield block
             if self._progress is not None:
-                self._progress(min(start + BLOCK, total), total)
+                self._progress(last, len(self.poses))
+
+    def arrive(self, travel: Travel | None) -> None:
+        """Go on along a path from where another run left off."""
+        self._travel = deepcopy(travel)
+
+    def arrivals(self, starts: Iterable[int]) -> Iterator[Travel | None]:
+        """How a path comes to each of the poses numbered `starts`, ascending; None of no path."""
+        travel, before = deepcopy(self._travel), 0
+        for start in starts:
+            if travel is not None:
+                for first in range(before, start, BLOCK):
+                    poses = self.poses[first : min(first + BLOCK, start)]
+                    travel.into(self.machine.kernel.place(poses)[0])
+            before = start
+            yield deepcopy(travel)
 
     def _block(self, start: int, poses: Floats) -> PoseBlock:
         joints, placements, status = self.machine.kernel.place(poses)
@@ -302,17 +333,15 @@ def _carried_on(rows: Floats, counts: Callable[[Floats], np.ndarray]) -> Floats:
 
 
 def no_pose_left(
-    machine: Machine, poses: Floats, left_out: SkippedPoses, *, of_file: bool
+    machine: Machine, poses: PoseTable, left_out: Mapping[str, int], *, of_file: bool
 ) -> RequestError:
     """The error where no pose can be used: what fails, by how much, where it fails least.
 
-    `of_file`: the poses are those of the machine file.
+    `left_out`: how many poses for each reason. `of_file`: the poses are those of the machine file.
     """
-    _, status = left_out.sorted()
-    names, counts = np.unique(status, return_counts=True)
+    names = sorted(left_out)
     reasons = ", ".join(
-        f"{count} {'where ' if name == BAND else ''}{reason_text(str(name))}"
-        for name, count in zip(names, counts, strict=True)
+        f"{left_out[name]} {'where ' if name == BAND else ''}{reason_text(name)}" for name in names
     )
     looked_at = np.unique(np.linspace(0, len(poses) - 1, EXPLAINED).astype(np.intp))
     nearest: tuple[float, str] | None = None

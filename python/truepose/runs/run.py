@@ -60,10 +60,11 @@ class Run(PoseRun):
         Raises `RequestError`: bad-poses, no-workspace, no-source, unknown-part.
         """
         given = machine.condition if condition is None else condition
-        table = requested_poses(machine, poses)
+        self._table = requested_poses(machine, poses)
         self.sources = required_sources(machine, given) if sources is None else tuple(sources)
         self._of_file = poses is None
-        super().__init__(machine, table, given, progress, path=self._of_file and is_path(machine))
+        path = self._of_file and is_path(machine)
+        super().__init__(machine, self._table, given, progress, path=path)
 
     def begin(self, schema: Schema, **others: int) -> DatasetRows:
         """Make room for a result of `schema`; `others`: lengths of dims of its own."""
@@ -111,7 +112,7 @@ class Run(PoseRun):
             self.condition,
             self._schema,
             self.rows,
-            self.poses,
+            self._table,
             self.left_out,
             over_all=over_all,
             coords=coords,
@@ -119,7 +120,7 @@ class Run(PoseRun):
 
     def no_pose_left(self) -> RequestError:
         """The error where no pose can be used."""
-        return no_pose_left(self.machine, self.poses, self.left_out, of_file=self._of_file)
+        return no_pose_left(self.machine, self.poses, self.left_out.counts(), of_file=self._of_file)
 
 
 def in_parts(

@@ -17,6 +17,7 @@ from truepose.spatial import quaternion_to_matrix
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Machine
+    from truepose.machine.workspace import PoseTable
 
 
 Cause = Literal["tool", "own", "all"]
@@ -40,7 +41,7 @@ class PoseBlock(Represented):
 
     machine: Machine
     condition: Condition
-    requested: Floats
+    requested: PoseTable
     indices: Indices
     joints: Floats
     placements: Floats

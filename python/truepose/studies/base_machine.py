@@ -112,7 +112,7 @@ def read_base(path: str | Path, settings: Sequence[str]) -> tuple[BaseMachine, M
     has = np.ones(len(poses), np.bool_)
     has[indices] = False
     if not has.any():
-        raise no_pose_left(machine, poses, skipped, of_file=True)
+        raise no_pose_left(machine, poses, skipped.counts(), of_file=True)
     workspace = machine.workspace
     if not fit.all():
         workspace = Workspace(listed=poses[fit], line=workspace.line, is_path=workspace.is_path)

@@ -168,7 +168,7 @@ def _parts(task: BlockTask, settings: tuple[str, ...]) -> Iterator[dict[str, Any
         return
     if evaluation is None:
         required_sources(machine, machine.condition)  # raises: without one there is no budget
-        raise no_pose_left(machine, machine.poses(), skipped, of_file=True)
+        raise no_pose_left(machine, machine.poses(), skipped.counts(), of_file=True)
     variant = EvaluatedVariant(machine, evaluation)
     if task.constraints.needs_kinematics:
         kinematics = Kinematics.of(variant)

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from truepose._kernel import instruction_set
 from truepose.cluster.options import ClusterOptions
-from truepose.cluster.workers import Told, Workers, connected
+from truepose.cluster.workers import Workers, connected
 from truepose.studies.block import Arrays, BlockTask, evaluate_block, evaluate_part
 
 Blocks = Iterator[tuple[int, Arrays]]
@@ -43,14 +43,14 @@ class Local:
 class OnCluster:
     """Whole blocks on workers, to which it connects when they are first needed."""
 
-    def __init__(self, options: ClusterOptions, told: Told, stack: ExitStack) -> None:
-        """`stack`: what ends the connection; `told`: called with who is given no work, and why."""
-        self._options, self._told, self._stack = options, told, stack
+    def __init__(self, options: ClusterOptions, stack: ExitStack) -> None:
+        """`stack`: what ends the connection."""
+        self._options, self._stack = options, stack
         self._workers: Workers | None = None
 
     def _connected(self) -> Workers:
         if self._workers is None:
-            self._workers = self._stack.enter_context(connected(self._options, self._told))
+            self._workers = self._stack.enter_context(connected(self._options))
         return self._workers
 
     def begun_with(self) -> str:
@@ -82,21 +82,13 @@ class OnCluster:
 
 
 @contextmanager
-def evaluator_of(
-    options: ClusterOptions | None, told: Told | None = None
-) -> Iterator[BlockEvaluator]:
-    """The evaluator that was asked for; `told`: by default a warning of Python."""
+def evaluator_of(options: ClusterOptions | None) -> Iterator[BlockEvaluator]:
+    """The evaluator that was asked for."""
     if options is None:
         yield Local()
         return
     with ExitStack() as stack:
-        yield OnCluster(options, _warned if told is None else told, stack)
-
-
-def _warned(text: str) -> None:
-    import warnings
-
-    warnings.warn(text, stacklevel=2)
+        yield OnCluster(options, stack)
 
 
 __all__ = ["BlockEvaluator", "Local", "OnCluster", "evaluator_of"]

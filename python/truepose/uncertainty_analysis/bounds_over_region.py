@@ -22,7 +22,7 @@ from truepose.arrays import Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import Schema, Variable, provenance, region_dataset
+from truepose.runs.dataset import Schema, Variable, overall_dataset, provenance
 from truepose.runs.poses import PoseRun, Progress, faults_text, pose_in_words, required_sources
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import PoseBlock, Source
@@ -173,7 +173,7 @@ def bounds_over_region(
         "status": status,
     }
     schema = {**SCHEMA, **UNFINISHED} if rest else SCHEMA
-    result = region_dataset(machine, condition, schema, values)
+    result = overall_dataset(machine, condition, schema, values)
     return result.assign_attrs(
         question | {"gap_reached": float(proof["gap"]), "interrupted": int(proof["interrupted"])}
     )

@@ -93,7 +93,7 @@ class Placed:
         if not usable.any():
             left_out = SkippedPoses()
             left_out.add(np.flatnonzero(~usable), status)
-            raise no_pose_left(machine, requested, left_out, of_file=of_file)
+            raise no_pose_left(machine, requested, left_out.counts(), of_file=of_file)
         self.left_out = int((~usable).sum())
         self.poses, self.conditioning = (
             requested[usable],

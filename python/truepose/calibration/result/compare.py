@@ -118,7 +118,7 @@ def compare(old: Machine, new: Machine, poses: ArrayLike | None = None) -> xr.Da
         covariance = slopes[usable] @ change.covariance @ slopes[usable].transpose(0, 2, 1)
         blocks.append((block.indices[usable], displacement[usable], covariance))
     if not sum(len(indices) for indices, _, _ in blocks):
-        raise no_pose_left(before, requested, run.left_out, of_file=poses is None)
+        raise no_pose_left(before, requested, run.left_out.counts(), of_file=poses is None)
     indices, displacement, covariance = (
         np.concatenate(parts) for parts in zip(*blocks, strict=True)
     )

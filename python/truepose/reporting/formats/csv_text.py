@@ -61,7 +61,12 @@ def text(result: Result) -> Iterator[str]:
         test = test_named(str(result.dataset.attrs["test"]))
         yield from importlib.import_module(test.reporting).csv_text(result)
         return
-    for dim, other_form in (("time", _over_time), ("parameter", _shares), ("commanded", _region)):
+    for dim, other_form in (
+        ("time", _over_time),
+        ("parameter", _shares),
+        ("reason", _summary),
+        ("commanded", _region),
+    ):
         if dim in sizes:
             yield from other_form(result)
             return
@@ -247,6 +252,21 @@ def _cells_of(result: Result, name: str, pose: int, of: str) -> list[list[object
         return [[""] * result.dataset.sizes["component"]] * len(result.labels(of))
     rows: list[list[object]] = result.values(name).array[pose].tolist()
     return [[_cell(cell) for cell in row] for row in rows]
+
+
+def _summary(result: Result) -> Iterator[str]:
+    """One row for each number: the variable, of what it is, and its unit."""
+    yield _lines([["name", "of", "value", "unit"]])
+    for name in result.variables():
+        values = result.values(name)
+        labels = [result.labels(dim) for dim in values.dims]
+        rows = []
+        for at in np.ndindex(values.array.shape):
+            of = " ".join(names[number] for names, number in zip(labels, at, strict=True))
+            unit = values.unit(*(at[axis] for axis in values.mixed))
+            value = values.array[at].item()
+            rows.append([name, of, _cell(value) if isinstance(value, float) else value, unit])
+        yield _lines(rows)
 
 
 def _region(result: Result) -> Iterator[str]:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import click
 
 from truepose.cli._options import WholeNumber
+from truepose.cluster.options import RefusedWorkerWarning
 
 cluster_options = (
     click.option(
@@ -31,6 +36,19 @@ cluster_options = (
 )
 
 
-def told(text: str) -> None:
-    """Say who is given no work."""
-    click.echo(f"warning: {text}", err=True)
+@contextmanager
+def telling() -> Iterator[None]:
+    """Say on stderr, inside, which workers are given no work."""
+
+    def tell(message: Warning | str, *_: Any) -> None:
+        click.echo(f"warning: {message}", err=True)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RefusedWorkerWarning)
+        shown = warnings.showwarning
+        warnings.showwarning = lambda message, kind, *where: (
+            tell(message)
+            if issubclass(kind, RefusedWorkerWarning)
+            else shown(message, kind, *where)
+        )
+        yield

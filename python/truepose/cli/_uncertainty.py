@@ -8,6 +8,7 @@ import click
 
 import truepose
 from truepose.cli import _steps
+from truepose.cli._cluster import telling
 from truepose.cli._options import Request
 from truepose.cli._progress import progress
 from truepose.errors import Problem, ReadingError, RequestError
@@ -28,7 +29,7 @@ SYNTAX = "x=200:400,y=100:300"
 
 def sample(request: Request, machine: Machine, **asked: Any) -> xr.Dataset:
     """The error sampled over the file's workspace; after Ctrl-C, what there is by then."""
-    with progress("Monte Carlo", "samples", first="the worst poses") as report:
+    with telling(), progress("Monte Carlo", "samples", first="the worst poses") as report:
         result = truepose.monte_carlo(machine, progress=report, **asked)
     if result.attrs.get("interrupted"):
         count = int(result["samples"].sum())
@@ -57,7 +58,7 @@ def bound(
     if "resume" in asked:
         asked["resume"] = netcdf.read(asked["resume"])
     of = ("poses", "the worst poses") if region is None else ("boxes", "the highest bounds")
-    with progress("bounds", of[0], first=of[1]) as report:
+    with telling(), progress("bounds", of[0], first=of[1]) as report:
         result = truepose.bounds(machine, progress=report, **asked)
     if result.attrs.get("interrupted"):
         click.echo(uncertainty_tables.interrupted_bounds(result), err=True)

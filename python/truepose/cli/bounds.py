@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from truepose.cli import _complete
+from truepose.cli._cluster import cluster_options
 from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     FileName,
@@ -59,6 +60,7 @@ from truepose.cli._verbose import verbose_option
     output_option,
     strict_option,
     accuracy_option,
+    *cluster_options,
     verbose_option,
 )
 def command(
@@ -66,6 +68,9 @@ def command(
     gap: float | None,
     truncate: float | None,
     resume: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    tls: Path | None,
     **options: Any,
 ) -> int:
     """Prove what the error cannot exceed.
@@ -77,13 +82,20 @@ def command(
     when it is not proven that the accuracy asked is kept.
     """
     from truepose.cli import _steps, _uncertainty
+    from truepose.cluster.options import requested_cluster
     from truepose.reporting import uncertainty_tables
     from truepose.reporting.result import Result
     from truepose.verdict.answer import BEFORE, met
 
     request = Request(**options)
+    cluster = {"workers": workers, "scheduler": scheduler, "tls": tls}
+    requested_cluster(workers, scheduler, tls)
+    if region is not None and any(each is not None for each in cluster.values()):
+        raise click.UsageError("A region is one search: workers are for the file's poses.")
     machine = _steps.read_machine(request)
-    proven = _uncertainty.bound(request, machine, region, gap=gap, truncate=truncate, resume=resume)
+    proven = _uncertainty.bound(
+        request, machine, region, gap=gap, truncate=truncate, resume=resume, **cluster
+    )
     result, tables = Result("bounds", machine, proven), uncertainty_tables.bounds(machine, proven)
     if proven.attrs.get("interrupted"):
         _steps.deliver(request, result, tables)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from truepose.cli._cluster import cluster_options, told
+from truepose.cli._cluster import cluster_options, telling
 from truepose.cli._options import (
     Request,
     accuracy_option,
@@ -68,7 +68,7 @@ def command(
     from truepose.verdict.answer import BEFORE, met
 
     request = Request(**options)
-    cluster = requested_cluster(workers, scheduler, tls, told)
+    cluster = requested_cluster(workers, scheduler, tls)
     if summary:
         return _summarise(request, cluster)
     if cluster is not None:
@@ -105,7 +105,7 @@ def _summarise(request: Request, cluster: ClusterOptions | None) -> int:
             "A summary judges no machine: --require-accuracy and --witness go without --summary."
         )
     machine = _steps.read_machine(request)
-    with progress("error budget") as report:
+    with telling(), progress("error budget") as report:
         found = summary_of(machine, None, None, report, cluster)
     _steps.show_warnings(warnings_of(found))
     if request.strict:

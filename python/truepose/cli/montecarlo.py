@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
 
+from truepose.cli._cluster import cluster_options
 from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     Request,
@@ -59,10 +61,19 @@ from truepose.cli._verbose import verbose_option
     format_option,
     output_option,
     strict_option,
+    *cluster_options,
     verbose_option,
 )
 def command(
-    samples: int | None, digits: int, probability: float, seed: int, sampling: str, **options: Any
+    samples: int | None,
+    digits: int,
+    probability: float,
+    seed: int,
+    sampling: str,
+    workers: int | None,
+    scheduler: str | None,
+    tls: Path | None,
+    **options: Any,
 ) -> int:
     """Sample the error of machines within their tolerances.
 
@@ -71,10 +82,12 @@ def command(
     workspace. Ctrl-C stops the drawing and gives the result so far (exit code 130).
     """
     from truepose.cli import _steps, _uncertainty
+    from truepose.cluster.options import requested_cluster
     from truepose.reporting import uncertainty_tables
     from truepose.reporting.result import Result
 
     request = Request(**options)
+    requested_cluster(workers, scheduler, tls)
     machine = _steps.read_machine(request)
     result = _uncertainty.sample(
         request,
@@ -84,6 +97,9 @@ def command(
         probability=probability,
         seed=seed,
         sampling=sampling,
+        workers=workers,
+        scheduler=scheduler,
+        tls=tls,
     )
     _steps.deliver(
         request, Result("montecarlo", machine, result), uncertainty_tables.sampled(machine, result)

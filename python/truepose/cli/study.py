@@ -142,7 +142,7 @@ def command(
     is done stands in the store; after Ctrl-C (exit code 130), or however the program ended, the
     same command goes on.
     """
-    from truepose.cli._cluster import told
+    from truepose.cli._cluster import telling
     from truepose.cli._progress import progress, waiting
     from truepose.cli._steps import note_written
     from truepose.cli._verbose import say_machine, say_result
@@ -152,7 +152,7 @@ def command(
     from truepose.studies.evaluators import evaluator_of
     from truepose.studies.quantities import QUICK_NAMES
 
-    cluster = requested_cluster(workers, scheduler, tls, told)
+    cluster = requested_cluster(workers, scheduler, tls)
     request = Request(**options)
     output = request.output
     if (output is None) is not dry_run:
@@ -201,7 +201,7 @@ def command(
             f"{output}: {done:,} of {counted(total, 'variant')} are done, going on", err=True
         )
 
-    with evaluator_of(cluster) as evaluator, progress("study", "variants") as report:
+    with telling(), evaluator_of(cluster) as evaluator, progress("study", "variants") as report:
         result = studies.run(
             prepared, output, evaluator=evaluator, progress=report, going_on=going_on
         )

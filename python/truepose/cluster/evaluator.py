@@ -3,33 +3,85 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any, Protocol
 
-from truepose.cluster.in_worker import Function
+from truepose._kernel import instruction_set
 from truepose.cluster.options import ClusterOptions
 
+if TYPE_CHECKING:
+    from truepose.cluster.in_worker import Function
+    from truepose.cluster.workers import Workers
 
-def computed(
-    cluster: ClusterOptions | None,
-    function: Function,
-    shared: Any,
-    tasks: Iterator[tuple[int, Any]],
-) -> Iterator[tuple[int, Any]]:
-    """(number, `function(shared, own)`) of every task (number, own), as they come.
+Tasks = Iterator[tuple[int, Any]]
+"""A number of its own and an argument of each."""
 
-    `function` is one that a worker can import. On workers the instruction set is the least that
-    this process and those present have. Raises `RequestError`: no-scheduler, no-worker,
-    worker-lost, and what the function raises.
-    """
-    if cluster is None:
+
+class Evaluator(Protocol):
+    """What computes tasks."""
+
+    def begun_with(self) -> str:
+        """The instruction set that something new is begun with."""
+
+    def results(self, function: Function, shared: Any, tasks: Tasks) -> Iterator[tuple[int, Any]]:
+        """(number, `function(shared, own)`) of every task (number, own), as they come."""
+
+
+class Here:
+    """One task after the other in this process, on the instruction set in use."""
+
+    def begun_with(self) -> str:
+        """The instruction set in use."""
+        return instruction_set()
+
+    def results(self, function: Function, shared: Any, tasks: Tasks) -> Iterator[tuple[int, Any]]:
+        """As `Evaluator`."""
         for number, own in tasks:
             yield number, function(shared, own)
-        return
-    from truepose.cluster.hand_out import results
-    from truepose.cluster.workers import connected
-
-    with connected(cluster) as workers:
-        yield from results(workers, function, shared, tasks, workers.begun_with())
 
 
-__all__ = ["computed"]
+class OnWorkers:
+    """Workers, to which it connects when they are first needed."""
+
+    def __init__(self, options: ClusterOptions, stack: ExitStack) -> None:
+        """`stack`: what ends the connection."""
+        self._options, self._stack = options, stack
+        self._workers: Workers | None = None
+
+    def _connected(self) -> Workers:
+        from truepose.cluster.workers import connected  # here, where it is needed: it takes long
+
+        if self._workers is None:
+            self._workers = self._stack.enter_context(connected(self._options))
+        return self._workers
+
+    def begun_with(self) -> str:
+        """The least instruction set that this process and the workers present have.
+
+        Raises `RequestError`: no-scheduler, no-worker.
+        """
+        return self._connected().begun_with()
+
+    def results(
+        self, function: Function, shared: Any, tasks: Tasks, instructions: str | None = None
+    ) -> Iterator[tuple[int, Any]]:
+        """As `Evaluator`; `function` is one that a worker can import, all else can be pickled.
+
+        `instructions`: by default those of `begun_with`. Raises `RequestError`: no-scheduler,
+        no-worker, worker-lost, and what the function raises.
+        """
+        from truepose.cluster.hand_out import results
+
+        workers = self._connected()
+        chosen = workers.begun_with() if instructions is None else instructions
+        return results(workers, function, shared, tasks, chosen)
+
+
+@contextmanager
+def evaluator_of(options: ClusterOptions | None) -> Iterator[Evaluator]:
+    """The evaluator that was asked for."""
+    with ExitStack() as stack:
+        yield Here() if options is None else OnWorkers(options, stack)
+
+
+__all__ = ["Evaluator", "Here", "OnWorkers", "Tasks", "evaluator_of"]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -19,33 +17,21 @@ TLS_FILES = {"ca": "ca.pem", "certificate": "cert.pem", "key": "key.pem"}
 _ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:]+\]|[\w.-]+):\d{1,5}")
 
 
-Told = Callable[[str], None]
-"""Called with a sentence on a worker that is refused."""
-
-
-def warned(text: str) -> None:
-    """Tell as Python warns."""
-    warnings.warn(text, stacklevel=2)
+class RefusedWorkerWarning(UserWarning):
+    """A worker is given no work; the text says which, and why."""
 
 
 @dataclass(frozen=True)
 class ClusterOptions:
-    """So many `workers` on this computer, or those of a `scheduler`; `tls`: the folder for it.
-
-    `told`: who hears of workers that are given no work.
-    """
+    """So many `workers` on this computer, or those of a `scheduler`; `tls`: the folder for it."""
 
     workers: int | None = None
     scheduler: str | None = None
     tls: Path | None = None
-    told: Told = field(default=warned, compare=False)
 
 
 def requested_cluster(
-    workers: int | None,
-    scheduler: str | None,
-    tls: str | Path | None,
-    told: Told = warned,
+    workers: int | None, scheduler: str | None, tls: str | Path | None
 ) -> ClusterOptions | None:
     """What is asked for, or None where this process computes.
 
@@ -69,7 +55,7 @@ def requested_cluster(
                 hint="pip install 'truepose[cluster]'",
             )
         )
-    return ClusterOptions(workers, scheduler, folder, told)
+    return ClusterOptions(workers, scheduler, folder)
 
 
 def _of_number(workers: int | None, scheduler: str | None) -> list[Problem]:
@@ -144,4 +130,4 @@ def _of_folder(folder: Path) -> list[Problem]:
     ]
 
 
-__all__ = ["TLS_FILES", "ClusterOptions", "Told", "requested_cluster"]
+__all__ = ["TLS_FILES", "ClusterOptions", "RefusedWorkerWarning", "requested_cluster"]

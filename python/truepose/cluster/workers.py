@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from truepose._kernel import instruction_set
 from truepose.cluster.in_worker import Greeting, greet, versions
 from truepose.cluster.instruction_sets import has, least
-from truepose.cluster.options import TLS_FILES, ClusterOptions, Told
+from truepose.cluster.options import TLS_FILES, ClusterOptions, RefusedWorkerWarning
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import counted
 
@@ -41,14 +41,13 @@ class Workers:
     `usable`: greetings by address; `refused`: sentences by address.
     """
 
-    def __init__(self, client: Client, place: str, told: Told) -> None:
+    def __init__(self, client: Client, place: str) -> None:
         """`place`: what the scheduler is called in messages."""
         self.client = client
         self.place = place
         self.usable: dict[str, Greeting] = {}
         self.refused: dict[str, str] = {}
         self.lost: dict[str, str] = {}
-        self._told = told
         self._untold: list[str] = []
         self._asked: dict[str, Future] = {}
         self._required: str | None = None
@@ -168,7 +167,7 @@ class Workers:
         """Name the refused, once there is one that may compute; an error names them otherwise."""
         if self.usable:
             for said in self._untold:
-                self._told(f"no work is given to {said}")
+                warnings.warn(f"no work is given to {said}", RefusedWorkerWarning, stacklevel=2)
             self._untold.clear()
 
     def _none(self) -> RequestError:
@@ -217,7 +216,7 @@ def connected(options: ClusterOptions) -> Iterator[Workers]:
         else:
             client = stack.enter_context(_answering(options))
             place = f"the scheduler {options.scheduler}"
-        yield Workers(client, place, options.told)
+        yield Workers(client, place)
 
 
 @contextmanager
@@ -229,6 +228,7 @@ def _silent() -> Iterator[None]:
         logger.setLevel(logging.CRITICAL + 1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        warnings.simplefilter("always", RefusedWorkerWarning)
         try:
             yield
         finally:

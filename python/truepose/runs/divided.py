@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from truepose.cluster.evaluator import computed
+from truepose.cluster.evaluator import Evaluator, evaluator_of
 from truepose.cluster.options import ClusterOptions
 from truepose.runs.poses import BLOCK, PoseRun, Travel
 
@@ -43,7 +43,7 @@ def in_parts(
     """What `make(shared, part)` gives of every part of a run, in the order of the parts.
 
     `make` is one that a worker can import, and it and `shared` can be pickled; `told` is called
-    with how many poses are done. Raises `RequestError` as `cluster.evaluator.computed`.
+    with how many poses are done. Raises `RequestError` as `cluster.evaluator.OnWorkers`.
     """
     total = len(run.poses)
     blocks = -(-total // BLOCK)
@@ -54,15 +54,15 @@ def in_parts(
         for number, (start, travel) in enumerate(zip(starts, run.arrivals(starts), strict=True)):
             yield number, Part(start, min(start + n_pose, total), travel)
 
-    done: list[int] = [0]
-
-    def made() -> Iterator[tuple[int, T]]:
-        for number, result in computed(cluster, make, shared, parts()):
-            done[0] += min(n_pose, total - starts[number])
-            told(done[0])
+    def made(evaluator: Evaluator) -> Iterator[tuple[int, T]]:
+        done = 0
+        for number, result in evaluator.results(make, shared, parts()):
+            done += min(n_pose, total - starts[number])
+            told(done)
             yield number, result
 
-    return in_order(made())
+    with evaluator_of(cluster) as evaluator:
+        yield from in_order(made(evaluator))
 
 
 def in_order(numbered: Iterator[tuple[int, Any]]) -> Iterator[Any]:

@@ -49,6 +49,13 @@ class PoseBlock(Represented):
     times: Floats | None = None
     corrected: Floats | None = None
 
+    def alone(self) -> PoseBlock:
+        """The same poses as all that a run has: what is sent elsewhere is as small as they are."""
+        requested, count = self.requested[self.indices], self.indices.size
+        return dataclasses.replace(
+            self, requested=requested, indices=np.arange(count, dtype=np.intp)
+        )
+
     def select(self, usable: Flags) -> PoseBlock:
         """The poses where `usable` (n,); the block itself where all are."""
         if usable.all():

@@ -8,9 +8,8 @@ from dataclasses import replace
 from itertools import chain
 from typing import Protocol
 
-from truepose._kernel import instruction_set
+from truepose.cluster.evaluator import Here, OnWorkers
 from truepose.cluster.options import ClusterOptions
-from truepose.cluster.workers import Workers, connected
 from truepose.studies.block import Arrays, BlockTask, evaluate_block, evaluate_part
 
 Blocks = Iterator[tuple[int, Arrays]]
@@ -27,12 +26,8 @@ class BlockEvaluator(Protocol):
         """Evaluate tasks of one study; `told` is called with how many variants more are done."""
 
 
-class Local:
+class Local(Here):
     """One block after the other in this process."""
-
-    def begun_with(self) -> str:
-        """The instruction set in use."""
-        return instruction_set()
 
     def evaluate(self, tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
         """As `BlockEvaluator`."""
@@ -40,30 +35,11 @@ class Local:
             yield task.number, evaluate_block(task, lambda _: told(1))
 
 
-class OnCluster:
-    """Whole blocks on workers, to which it connects when they are first needed."""
-
-    def __init__(self, options: ClusterOptions, stack: ExitStack) -> None:
-        """`stack`: what ends the connection."""
-        self._options, self._stack = options, stack
-        self._workers: Workers | None = None
-
-    def _connected(self) -> Workers:
-        if self._workers is None:
-            self._workers = self._stack.enter_context(connected(self._options))
-        return self._workers
-
-    def begun_with(self) -> str:
-        """The least instruction set that this process and the workers present have.
-
-        Raises `RequestError`: no-scheduler, no-worker.
-        """
-        return self._connected().begun_with()
+class OnCluster(OnWorkers):
+    """Whole blocks on workers."""
 
     def evaluate(self, tasks: Iterator[BlockTask], told: Callable[[int], None]) -> Blocks:
-        """As `BlockEvaluator`. Raises `RequestError` as `hand_out.results`."""
-        from truepose.cluster.hand_out import results
-
+        """As `BlockEvaluator`. Raises `RequestError` as `OnWorkers.results`."""
         first = next(tasks, None)
         if first is None:
             return
@@ -75,8 +51,7 @@ class OnCluster:
                 lengths[task.number] = len(task.variants)
                 yield task.number, task.variants
 
-        workers = self._connected()
-        for number, arrays in results(workers, evaluate_part, shared, own(), first.instruction_set):
+        for number, arrays in self.results(evaluate_part, shared, own(), first.instruction_set):
             yield number, arrays
             told(lengths.pop(number))
 

@@ -10,12 +10,15 @@ sphere: along an error the most that it can do is the length of its three effect
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
+from truepose.cluster.evaluator import Evaluator, evaluator_of
+from truepose.cluster.options import requested_cluster
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -79,6 +82,9 @@ def bounds(
     gap: float = 0.05,
     truncate: float | None = None,
     resume: xr.Dataset | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    tls: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Proven bounds of the error over every combination of deviations in their bands.
@@ -102,10 +108,15 @@ def bounds(
     was met that cannot be assembled is left out as `band`. The Dataset, SI, is described in
     docs/results.md.
 
+    `workers`: so many processes of this computer prove the bounds at poses, or those of the
+    dask.distributed `scheduler` at "tcp://HOST:PORT", or "tls://HOST:PORT" and `tls`, a folder with
+    ca.pem, cert.pem and key.pem; the numbers are the same (docs/scale.md).
+
     Raises `RequestError`: bad-truncation, bad-gap, bad-region, bad-resume, region-out-of-reach,
     no-proof (a machine or a source that cannot be enclosed), bad-poses, no-workspace, no-source,
-    no-pose-left.
+    no-pose-left, bad-workers, no-scheduler, no-worker, worker-lost, extra-missing.
     """
+    cluster = requested_cluster(workers, scheduler, tls)
     given = machine.condition if condition is None else condition
     ends = Ends.of(truncate)
     if machine.kernel.overconstrained:
@@ -117,7 +128,17 @@ def bounds(
     if region is None:
         if resume is not None:
             raise bad_resume("bounds are asked for at poses", "no region", "the same region")
-        return _at_poses(machine, poses, given, ends, progress)
+        with evaluator_of(cluster) as evaluator:
+            return _at_poses(machine, poses, given, ends, evaluator, progress)
+    if cluster is not None:
+        raise RequestError(
+            Problem(
+                "bad-workers",
+                "workers share poses, and a region is one search",
+                found=f"{cluster.workers or cluster.scheduler} over a region",
+                expected="bounds at poses, or no workers",
+            )
+        )
     if poses is not None:
         raise RequestError(
             Problem(
@@ -135,6 +156,7 @@ def _at_poses(
     poses: ArrayLike | None,
     condition: Condition,
     ends: Ends,
+    evaluator: Evaluator,
     progress: Progress | None,
 ) -> xr.Dataset:
     run = Run(machine, poses, condition)
@@ -148,11 +170,17 @@ def _at_poses(
             usable = run.keep(block.indices, of_band(status))
             block, every, value = block.select(usable), every.select(usable), value[usable]
             effects = effects[usable]
-            for part in _worst_first(machine, value, effects):
-                some = block.select(part)
-                order = (value[part], effects[part])
-                found.append((part, *_bounded(machine, some, every.select(part), order)))
-                done += int(part.sum())
+            parts = list(_worst_first(machine, value, effects))
+            tasks = (
+                (
+                    number,
+                    (block.select(part).alone(), every.select(part), value[part], effects[part]),
+                )
+                for number, part in enumerate(parts)
+            )
+            for number, bounded in evaluator.results(_bounded, machine, tasks):
+                found.append((parts[number], *bounded))
+                done += int(parts[number].sum())
                 if progress is not None:
                     progress(done, len(run.poses))
         except KeyboardInterrupt:
@@ -233,13 +261,13 @@ def proven_bounds(
 
 
 def _bounded(
-    machine: Machine,
-    block: PoseBlock,
-    variables: Variables,
-    order: tuple[Floats, Floats],
+    machine: Machine, at: tuple[PoseBlock, Variables, Floats, Floats]
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Every variable over the poses of a block, and a reason (n,) of each where it is unusable."""
-    value, effects = order
+    """Every variable over the poses of a block, and a reason (n,) of each where it is unusable.
+
+    `at`: the block, what varies there, and the error and effects to first order.
+    """
+    block, variables, value, effects = at
     kinds = list(quantities(machine.components).values())
     corners = worst_corners(
         ExactError(machine, block, variables), value, effects, variables.domain, kinds

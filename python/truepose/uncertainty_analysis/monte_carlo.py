@@ -13,15 +13,18 @@ describes errors (mean, standard deviation, covariance, extremes) is of those th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose._kernel import Study, Tallies
-from truepose.arrays import Floats
+from truepose._kernel import Tallies
+from truepose.cluster.evaluator import Evaluator, Here, evaluator_of
+from truepose.cluster.options import requested_cluster
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.arguments import checked
@@ -37,7 +40,7 @@ from truepose.runs.poses import (
     Progress,
     reason_unless,
 )
-from truepose.runs.quantities import POSITIONS, quantities
+from truepose.runs.quantities import POSITIONS
 from truepose.runs.run import Run, in_parts
 from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
@@ -48,11 +51,17 @@ from truepose.uncertainty_analysis.arguments import (
     required_samples,
     required_seed,
 )
-from truepose.uncertainty_analysis.failed_samples import OfAll, lost_text
+from truepose.uncertainty_analysis.failed_samples import lost_text
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
+from truepose.uncertainty_analysis.machine_sampler import (
+    FINENESS,
+    LEVELS,
+    MachineSampler,
+    statistics,
+)
 from truepose.uncertainty_analysis.model import FunctionModel, first_order_variances
-from truepose.uncertainty_analysis.sampler import Draws, Random, Sampler, sobol, study_of
-from truepose.uncertainty_analysis.stopping_rule import BATCH, Adaptive, FixedNumber, StoppingRule
+from truepose.uncertainty_analysis.sampler import Draws, Random, Sampler, sobol
+from truepose.uncertainty_analysis.stopping_rule import Adaptive, FixedNumber, StoppingRule
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,12 +71,6 @@ if TYPE_CHECKING:
 POSES = 32
 """Poses that are sampled together, from the same draws: their histograms take some 6 MB, which stay
 near the processor."""
-
-LEVELS = np.linspace(0.0, 1.0, 201)
-"""Probabilities of the quantiles that a result has."""
-
-FINENESS = 100.0
-"""Bins of a histogram in one standard deviation."""
 
 _EACH = ("pose", "component")
 _SIZE = ("pose", "quantity")
@@ -153,6 +156,9 @@ def monte_carlo(
     condition: Condition | None = None,
     digits: int = DIGITS,
     sampling: Literal["random", "sobol"] = "random",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    tls: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset: ...
 
@@ -186,6 +192,9 @@ def monte_carlo(
     correlation: Correlation = None,
     digits: int = DIGITS,
     sampling: Literal["random", "sobol"] = "random",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    tls: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """The distribution of the error, sampled: moments, quantiles and coverage intervals.
@@ -197,14 +206,19 @@ def monte_carlo(
     `samples` at each pose; by default as many as JCGM 101:2008, 7.9 takes until so many significant
     `digits` of the standard deviation are stable. Intervals hold the share `probability` of the
     samples. `sampling` "sobol": scrambled Sobol points instead of random ones (`samples` a power of
-    two; needs scipy). `progress` is called with (samples done over all poses, samples expected in
+    two; needs scipy). `workers`: so many processes of this computer sample the poses of a machine,
+    or those of the dask.distributed `scheduler` at "tcp://HOST:PORT", or "tls://HOST:PORT" and
+    `tls`, a folder with ca.pem, cert.pem and key.pem; the numbers are the same (docs/scale.md).
+    `progress` is called with (samples done over all poses, samples expected in
     all or 0 while that is not known).
     Ctrl-C, once there are samples, gives the result so far (attribute `interrupted`). The Dataset,
     SI, is described in docs/results.md.
 
     Raises `RequestError`: bad-samples, bad-seed, bad-probability, bad-digits, bad-poses,
-    no-workspace, no-source, no-pose-left, extra-missing; `TrueposeError` as the sources do.
+    no-workspace, no-source, no-pose-left, extra-missing, bad-workers, no-scheduler, no-worker,
+    worker-lost; `TrueposeError` as the sources do.
     """
+    cluster = requested_cluster(workers, scheduler, tls)
     asked = _Options(
         required_probability(probability),
         None if samples is None else required_samples(samples, 2),
@@ -213,7 +227,17 @@ def monte_carlo(
         _required_sampling(sampling, samples),
     )
     if isinstance(model, Machine):
-        return _of_machine(model, poses, condition, asked, progress)
+        with evaluator_of(cluster) as evaluator:
+            return _of_machine(model, poses, condition, asked, evaluator, progress)
+    if cluster is not None:
+        raise RequestError(
+            Problem(
+                "bad-workers",
+                "workers share the poses of a machine, and a function has none",
+                found=f"{cluster.workers or cluster.scheduler} for a function",
+                expected="a machine, or no workers",
+            )
+        )
     of = FunctionModel(model, poses if inputs is None else inputs, correlation)
     return _of_function(of, asked, progress)
 
@@ -268,6 +292,7 @@ def _of_machine(
     poses: ArrayLike | None,
     condition: Condition | None,
     asked: _Options,
+    evaluator: Evaluator,
     progress: Progress | None,
 ) -> xr.Dataset:
     run = Run(machine, poses, condition)
@@ -277,22 +302,22 @@ def _of_machine(
     account = _Account(progress, len(run.poses))
     interrupted = False
     for block, every in run.with_variables():
-        draws = asked.draws(every)
-        found: dict[int, tuple[dict[str, np.ndarray], np.ndarray]] = {}
+        found: dict[int, _Sampled] = {}
         listed = list(in_parts(block, every, POSES))
         # The part with the worst pose first: what is stopped early holds it.
-        for number in _worst_first(machine, block, every):
-            sampler = _MachineSampler(machine, *listed[number])
-            drawn = sampler.run(draws, asked.stop, account.add)
-            account.finish(sampler.n_pose)
-            interrupted = drawn.interrupted
-            if drawn.tallies is not None:
-                values = sampler.values(drawn.tallies, asked.probability)
-                found[number] = values, reason_unless(np.asarray(drawn.tallies.count) > 1, BAND)
-            if interrupted:
-                break
+        order = _worst_first(machine, block, every)
+        try:
+            for number, sampled in _sampled_parts(asked, listed, order, evaluator, account):
+                found[number] = sampled
+                interrupted = interrupted or sampled.interrupted
+                if interrupted:
+                    break
+        except KeyboardInterrupt:
+            interrupted = True
         for number in sorted(found):
-            run.fill(listed[number][0], *found[number])
+            values = found[number].values
+            if values is not None:
+                run.fill(listed[number][0], values, found[number].status)
         if interrupted:
             break
     if interrupted and rows.count == 0:
@@ -313,6 +338,76 @@ def _of_machine(
     )
 
 
+_Part = tuple[PoseBlock, Variables]
+"""Some poses, and what is drawn there."""
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """What the samples at some poses say: the values of each, and whether it can be used.
+
+    `values` is None where Ctrl-C came before there were any. `each`: samples at a pose.
+    """
+
+    values: Mapping[str, np.ndarray] | None
+    status: np.ndarray
+    each: int
+    interrupted: bool
+
+
+def _sampled_parts(
+    asked: _Options,
+    parts: Sequence[_Part],
+    order: Sequence[int],
+    evaluator: Evaluator,
+    account: _Account,
+) -> Iterator[tuple[int, _Sampled]]:
+    """The number of each part and its samples, in the `order` here, as they come from workers."""
+    here = isinstance(evaluator, Here)
+    # What runs here says how far it is, batch by batch, and is drawn once.
+    drawn = asked.draws(parts[0][1]) if here else None
+    sample = partial(_sampled, told=account.add, draws=drawn) if here else _sampled
+    tasks = ((number, parts[number] if here else _alone(parts[number])) for number in order)
+    for number, sampled in evaluator.results(sample, asked, tasks):
+        n_pose = parts[number][0].indices.size
+        if not here:
+            account.add(sampled.each * n_pose, sampled.each)
+        account.finish(n_pose)
+        yield number, sampled
+
+
+def _alone(part: _Part) -> _Part:
+    block, variables = part
+    return block.alone(), variables
+
+
+def _sampled(
+    asked: _Options,
+    part: _Part,
+    told: Callable[[int, int], None] | None = None,
+    draws: Draws | None = None,
+) -> _Sampled:
+    """The samples at the poses of a part, until there are enough; `told` as `Sampler.run`.
+
+    `draws`: those of all parts, which have the same variables; by default made anew.
+    """
+    block, variables = part
+    sampler = MachineSampler(block.machine, block, variables)
+    drawn = sampler.run(draws or asked.draws(variables), asked.stop, told or _nobody)
+    if drawn.tallies is None:
+        return _Sampled(None, np.empty(0, np.uint8), 0, drawn.interrupted)
+    return _Sampled(
+        sampler.values(drawn.tallies, asked.probability),
+        reason_unless(np.asarray(drawn.tallies.count) > 1, BAND),
+        drawn.each,
+        drawn.interrupted,
+    )
+
+
+def _nobody(samples: int, each: int) -> None:
+    """Nobody looks on."""
+
+
 def _worst_first(machine: Machine, block: PoseBlock, variables: Variables) -> list[int]:
     """Numbers of the parts of a block, the one with the largest first-order variance first."""
     _, effects, _ = first_order(machine, block, variables)
@@ -320,140 +415,6 @@ def _worst_first(machine: Machine, block: PoseBlock, variables: Variables) -> li
     variances = first_order_variances(machine, variables, effects)
     order: list[int] = np.argsort(-np.maximum.reduceat(variances, starts), kind="stable").tolist()
     return order
-
-
-class _MachineSampler(Sampler):
-    """A machine at some poses; columns of its tallies: components, magnitudes, ellipse distance."""
-
-    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables) -> None:
-        self.machine, self.block, self.variables = machine, block, variables
-        self._study = self._studied(None)
-        kinds = quantities(machine.components)
-        self._kinds = list(kinds.values())
-        self._axes = [at for at, name in enumerate(machine.components) if name in POSITIONS]
-        self.n_pose = block.indices.size
-        self._unwhitened = (self._origins()[0], self._widths())
-
-    def _studied(self, whitening: Floats | None) -> Study:
-        return study_of(self.machine, self.block, self.variables, whitening)
-
-    def _origins(self) -> tuple[Floats, int]:
-        error = np.asarray(self._study.shift_error)
-        origins = np.concatenate([error, np.zeros((len(error), len(self._kinds)))], axis=1)
-        return np.where(np.isfinite(origins), origins, 0.0), error.shape[1]
-
-    def _widths(self) -> Floats:
-        """(n, n_column) bins of the order of a hundredth of the first-order spread."""
-        _, effects, _ = first_order(self.machine, self.block, self.variables)
-        sigmas = np.array([distribution.sigmas for distribution in self.variables.distributions])
-        deviation = np.sqrt(np.square(effects / sigmas).sum(axis=2)) if sigmas.size else 0.0
-        deviation = np.nan_to_num(np.broadcast_to(deviation, effects.shape[:2]))
-        parts = [np.linalg.norm(deviation[:, kind], axis=1) for kind in self._kinds]
-        every = np.concatenate([deviation, np.stack(parts, axis=1)], axis=1)
-        # Where first order has no spread the bins begin tiny, and widen to what is met.
-        widths: Floats = np.maximum(every, 1e-15) / FINENESS
-        return widths
-
-    def begin(self, draws: Draws, count: int) -> Tallies:
-        """The first samples; the covariance of the first batch is the shape of the ellipse.
-
-        Its position errors are kept until that is known: the batch is not drawn again.
-        """
-        origins, widths = self._unwhitened
-        tallies = Tallies(origins, widths, origins.shape[1], len(self.machine.components))
-        if not self._axes:
-            self.sample(draws, 0, count, tallies)
-            return tallies
-        pilot = min(count, BATCH)
-        given = draws.given(0, pilot)
-        if given is None:
-            positions = self._study.sample_keeping(draws.variables, draws.seed, 0, pilot, tallies)
-        else:
-            positions = self._study.sample_given_keeping(draws.variables, given, tallies)
-        covariance = np.asarray(tallies.covariance)[:, self._axes][:, :, self._axes]
-        self._centre = np.asarray(tallies.mean)[:, self._axes]
-        self._shape = np.nan_to_num(covariance)
-        whitening = _whitening(self.machine, self._centre, self._shape)
-        tallies.append_lengths(positions, whitening, 1.0 / FINENESS)
-        self._study = self._studied(whitening)
-        if count > pilot:
-            self.sample(draws, pilot, count - pilot, tallies)
-        return tallies
-
-    def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
-        """Evaluates the samples from number `first` on."""
-        given = draws.given(first, count)
-        if given is None:
-            self._study.sample(draws.variables, draws.seed, first, count, into)
-        else:
-            self._study.sample_given(draws.variables, given, into)
-
-    @property
-    def checked(self) -> slice:
-        """Columns whose figures are to be stable."""
-        return slice(0, len(self.machine.components))
-
-    def values(self, tallies: Tallies, probability: float) -> dict[str, np.ndarray]:
-        """All variables of the schema, over poses first."""
-        m = len(self.machine.components)
-        values = statistics(tallies, m, probability)
-        sizes = slice(m, m + len(self._kinds))
-        of_all = OfAll(tallies)
-        upper = of_all.below([probability])[..., 0]
-        values |= {
-            "magnitude_mean": np.asarray(tallies.mean)[:, sizes],
-            "magnitude_upper": upper[:, sizes],
-            "magnitude_maximum": np.asarray(tallies.extremes)[:, sizes, 1],
-            "magnitude_quantile": of_all.below(LEVELS.tolist())[:, sizes],
-        }
-        if self._axes:
-            factor = upper[:, -1]
-            values["ellipse_centre"] = self._centre
-            values["ellipse"] = self._shape * np.square(factor)[:, np.newaxis, np.newaxis]
-        return values
-
-
-def _whitening(machine: Machine, centre: Floats, covariance: Floats) -> Floats:
-    """(n, 12) centre and matrix of the position error, in three components.
-
-    A direction in which nothing spreads does not count.
-    """
-    places = [POSITIONS.index(name) for name in machine.components if name in POSITIONS]
-    rows = np.zeros((len(centre), 12))
-    rows[:, places] = centre
-    values, vectors = np.linalg.eigh(covariance)
-    least = 1e-12 * values[:, -1:]
-    scale = np.where(values > np.maximum(least, 0.0), values, np.inf) ** -0.5
-    matrix: Floats = np.asarray(scale[:, :, np.newaxis] * np.swapaxes(vectors, 1, 2))
-    for row in range(len(places)):
-        for column, place in enumerate(places):
-            rows[:, 3 + 3 * row + place] = matrix[:, row, column]
-    return rows
-
-
-def statistics(tallies: Tallies, m: int, probability: float) -> dict[str, np.ndarray]:
-    """The variables of `SCHEMA` of the first m columns, over poses first."""
-    tail = 0.5 * (1.0 - probability)
-    of_all = OfAll(tallies)
-    ends = of_all.between([tail, 1.0 - tail])[:, :m]
-    shortest = of_all.shortest(probability)[:, :m]
-    extremes = np.asarray(tallies.extremes)[:, :m]
-    covariance = np.asarray(tallies.covariance)
-    variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
-    return {
-        "mean": np.asarray(tallies.mean)[:, :m],
-        "standard_deviation": np.sqrt(variance),
-        "covariance": covariance,
-        "lower": ends[..., 0],
-        "upper": ends[..., 1],
-        "shortest_lower": shortest[..., 0],
-        "shortest_upper": shortest[..., 1],
-        "minimum": extremes[..., 0],
-        "maximum": extremes[..., 1],
-        "quantile": of_all.between(LEVELS.tolist())[:, :m],
-        "samples": np.asarray(tallies.count),
-        "failed": np.asarray(tallies.failed),
-    }
 
 
 class _FunctionSampler(Sampler):
@@ -528,4 +489,4 @@ def _of_function(model: FunctionModel, asked: _Options, progress: Progress | Non
     )
 
 
-__all__ = ["ELLIPSE", "LEVELS", "MACHINE", "SCHEMA", "monte_carlo", "statistics"]
+__all__ = ["ELLIPSE", "MACHINE", "SCHEMA", "monte_carlo"]

@@ -217,6 +217,8 @@ class DrawnSamples:
 
     tallies: Tallies | None
     interrupted: bool
+    each: int = 0
+    """Samples at each pose."""
 
 
 class Sampler(ABC):
@@ -263,5 +265,5 @@ class Sampler(ABC):
                 done += count
                 account(count * self.n_pose, enough.expected(done))
         except KeyboardInterrupt:
-            return DrawnSamples(whole, True)
-        return DrawnSamples(whole, False)
+            return DrawnSamples(whole, True, done)
+        return DrawnSamples(whole, False, done)

@@ -95,6 +95,7 @@ def _summarise(request: Request, cluster: ClusterOptions | None) -> int:
     """The summary, of which no pose is kept; nothing is judged by it."""
     from truepose.cli import _steps
     from truepose.cli._progress import progress
+    from truepose.cluster.evaluator import evaluator_of
     from truepose.error_budget.summary import summary as summary_of
     from truepose.reporting import summary_tables, tables
     from truepose.reporting.result import Result
@@ -105,15 +106,15 @@ def _summarise(request: Request, cluster: ClusterOptions | None) -> int:
             "A summary judges no machine: --require-accuracy and --witness go without --summary."
         )
     machine = _steps.read_machine(request)
-    with telling(), progress("error budget") as report:
-        found = summary_of(machine, None, None, report, cluster)
-    _steps.show_warnings(warnings_of(found))
+    with telling(), evaluator_of(cluster) as evaluator, progress("error budget") as report:
+        summary = summary_of(machine, None, None, report, evaluator)
+    _steps.show_warnings(warnings_of(summary))
     if request.strict:
-        summary_tables.refuse_left_out(machine, found)
-    study = Study(machine, found)
+        summary_tables.refuse_left_out(machine, summary)
+    study = Study(machine, summary)
     _steps.deliver(
         request,
-        Result("budget", machine, found),
+        Result("budget", machine, summary),
         [
             tables.ranking(study),
             summary_tables.highest_at(study),

@@ -17,7 +17,7 @@ Tasks = Iterator[tuple[int, Any]]
 """A number of its own and an argument of each."""
 
 
-class Evaluator(Protocol):
+class TaskEvaluator(Protocol):
     """What computes tasks."""
 
     def begun_with(self) -> str:
@@ -35,7 +35,7 @@ class Here:
         return instruction_set()
 
     def results(self, function: Function, shared: Any, tasks: Tasks) -> Iterator[tuple[int, Any]]:
-        """As `Evaluator`."""
+        """As `TaskEvaluator`."""
         for number, own in tasks:
             yield number, function(shared, own)
 
@@ -65,7 +65,7 @@ class OnWorkers:
     def results(
         self, function: Function, shared: Any, tasks: Tasks, instructions: str | None = None
     ) -> Iterator[tuple[int, Any]]:
-        """As `Evaluator`; `function` is one that a worker can import, all else can be pickled.
+        """As `TaskEvaluator`; `function` is one that a worker can import, all else can be pickled.
 
         `instructions`: by default those of `begun_with`. Raises `RequestError`: no-scheduler,
         no-worker, worker-lost, and what the function raises.
@@ -78,10 +78,10 @@ class OnWorkers:
 
 
 @contextmanager
-def evaluator_of(options: ClusterOptions | None) -> Iterator[Evaluator]:
+def evaluator_of(options: ClusterOptions | None) -> Iterator[TaskEvaluator]:
     """The evaluator that was asked for."""
     with ExitStack() as stack:
         yield Here() if options is None else OnWorkers(options, stack)
 
 
-__all__ = ["Evaluator", "Here", "OnWorkers", "Tasks", "evaluator_of"]
+__all__ = ["Here", "OnWorkers", "TaskEvaluator", "Tasks", "evaluator_of"]

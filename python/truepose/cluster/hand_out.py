@@ -197,8 +197,8 @@ class _HandingOut:
                     "workers are lost at their tasks again and again",
                     found=f"{counted(len(names), 'worker')} lost: {', '.join(names)}",
                     expected="workers that live longer than a task",
-                    hint="see what ended them (memory, the time they may run); the same command "
-                    "goes on with what is done",
+                    hint="see what ended them (memory, the time they may run); a study goes on "
+                    "with what is done",
                 )
             )
 

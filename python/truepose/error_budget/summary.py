@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.cluster.options import ClusterOptions
+from truepose.cluster.evaluator import TaskEvaluator
+from truepose.error_budget.at_poses import SCHEMA, evaluate_block
 from truepose.error_budget.comparison import Highest
-from truepose.error_budget.evaluate import SCHEMA, evaluate_block
 from truepose.error_budget.tally import Tally
 from truepose.machine import Condition, Machine
 from truepose.machine.workspace import PoseTable
@@ -30,7 +30,7 @@ from truepose.runs.dataset import (
     overall_dataset,
     sizes,
 )
-from truepose.runs.divided import Part, in_parts
+from truepose.runs.divided import RunPart, in_parts
 from truepose.runs.poses import (
     BLOCK,
     PoseRun,
@@ -72,7 +72,7 @@ SUMMARY: Schema = {
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Common:
     """What the parts of a summary have in common."""
 
     machine: Machine
@@ -147,20 +147,20 @@ def summary(
     poses: ArrayLike | None,
     condition: Condition | None,
     progress: Progress | None,
-    cluster: ClusterOptions | None,
+    evaluator: TaskEvaluator,
 ) -> xr.Dataset:
     """The Dataset of `SUMMARY`; arguments and errors are those of `truepose.budget`."""
     given = machine.condition if condition is None else condition
     table = requested_table(machine, poses)
     sources = required_sources(machine, given)
-    asked = _Asked(machine, table, given, poses is None and is_path(machine), sources)
+    common = _Common(machine, table, given, poses is None and is_path(machine), sources)
 
     def told(done: int) -> None:
         if progress is not None:
             progress(done, len(table))
 
     whole = _Summary(machine, len(sources))
-    for part in in_parts(asked.run(), _summarised, asked, cluster, told):
+    for part in in_parts(common.run(), _summarised, common, evaluator, told):
         whole.join(part)
     if whole.tally.count == 0:
         raise no_pose_left(machine, table, whole.left_out, of_file=poses is None)
@@ -179,17 +179,17 @@ def summary(
     )
 
 
-def _summarised(asked: _Asked, part: Part) -> _Summary:
+def _summarised(common: _Common, part: RunPart) -> _Summary:
     """The summary of a part of the poses."""
-    run = asked.run()
+    run = common.run()
     run.arrive(part.travel)
-    n_source = len(asked.sources)
-    room = sizes(asked.machine, min(BLOCK, part.stop - part.start), source=n_source)
-    rows = DatasetRows(asked.machine, SCHEMA, room)
-    made = _Summary(asked.machine, n_source)
+    n_source = len(common.sources)
+    room = sizes(common.machine, min(BLOCK, part.stop - part.start), source=n_source)
+    rows = DatasetRows(common.machine, SCHEMA, room)
+    made = _Summary(common.machine, n_source)
     for block in run.between(part.start, part.stop):
         values = rows.room(block.indices.size)
-        usable = evaluate_block(run, asked.sources, block, values, made.tally)
+        usable = evaluate_block(run, common.sources, block, values, made.tally)
         made.add(block, values, usable)
     made.left_out = run.left_out.counts()
     return made

@@ -127,7 +127,8 @@ class Study:
     @cached_property
     def n_pose(self) -> int:
         """Number of poses that were evaluated."""
-        return int(self.budget.attrs["poses_used"])
+        used = self.budget.sizes.get("pose")
+        return int(self.budget.attrs["poses_used"] if used is None else used)
 
     @cached_property
     def numbers(self) -> Indices:

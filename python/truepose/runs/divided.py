@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from truepose.cluster.evaluator import Evaluator, evaluator_of
-from truepose.cluster.options import ClusterOptions
+from truepose.cluster.evaluator import TaskEvaluator
 from truepose.runs.poses import BLOCK, PoseRun, Travel
 
 MOST_BLOCKS = 32
@@ -25,7 +24,7 @@ S = TypeVar("S")
 
 
 @dataclass(frozen=True)
-class Part:
+class RunPart:
     """The poses of a run from number `start` to before `stop`, and how a path comes to them."""
 
     start: int
@@ -35,34 +34,32 @@ class Part:
 
 def in_parts(
     run: PoseRun,
-    make: Callable[[S, Part], T],
+    make: Callable[[S, RunPart], T],
     shared: S,
-    cluster: ClusterOptions | None,
+    evaluator: TaskEvaluator,
     told: Callable[[int], None],
 ) -> Iterator[T]:
     """What `make(shared, part)` gives of every part of a run, in the order of the parts.
 
-    `make` is one that a worker can import, and it and `shared` can be pickled; `told` is called
-    with how many poses are done. Raises `RequestError` as `cluster.evaluator.OnWorkers`.
+    `told` is called with how many poses are done. Raises as the evaluator does.
     """
     total = len(run.poses)
     blocks = -(-total // BLOCK)
     n_pose = BLOCK * max(1, min(MOST_BLOCKS, blocks // FEWEST_PARTS))
     starts = range(0, total, n_pose)
 
-    def parts() -> Iterator[tuple[int, Part]]:
+    def parts() -> Iterator[tuple[int, RunPart]]:
         for number, (start, travel) in enumerate(zip(starts, run.arrivals(starts), strict=True)):
-            yield number, Part(start, min(start + n_pose, total), travel)
+            yield number, RunPart(start, min(start + n_pose, total), travel)
 
-    def made(evaluator: Evaluator) -> Iterator[tuple[int, T]]:
+    def made() -> Iterator[tuple[int, T]]:
         done = 0
         for number, result in evaluator.results(make, shared, parts()):
             done += min(n_pose, total - starts[number])
             told(done)
             yield number, result
 
-    with evaluator_of(cluster) as evaluator:
-        yield from in_order(made(evaluator))
+    return in_order(made())
 
 
 def in_order(numbered: Iterator[tuple[int, Any]]) -> Iterator[Any]:
@@ -76,4 +73,4 @@ def in_order(numbered: Iterator[tuple[int, Any]]) -> Iterator[Any]:
             due += 1
 
 
-__all__ = ["Part", "in_order", "in_parts"]
+__all__ = ["RunPart", "in_order", "in_parts"]

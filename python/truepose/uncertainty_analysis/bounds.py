@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.cluster.evaluator import Evaluator, evaluator_of
+from truepose.cluster.evaluator import TaskEvaluator, evaluator_of
 from truepose.cluster.options import requested_cluster
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
@@ -156,7 +156,7 @@ def _at_poses(
     poses: ArrayLike | None,
     condition: Condition,
     ends: Ends,
-    evaluator: Evaluator,
+    evaluator: TaskEvaluator,
     progress: Progress | None,
 ) -> xr.Dataset:
     run = Run(machine, poses, condition)
@@ -164,7 +164,7 @@ def _at_poses(
     done, interrupted = 0, False
     for block, every in run.with_variables():
         every = ends.truncated(every)
-        found: list[_Found] = []
+        done_parts: list[_Found] = []
         try:
             value, effects, status = first_order(machine, block, every)
             usable = run.keep(block.indices, of_band(status))
@@ -179,13 +179,13 @@ def _at_poses(
                 for number, part in enumerate(parts)
             )
             for number, bounded in evaluator.results(_bounded, machine, tasks):
-                found.append((parts[number], *bounded))
+                done_parts.append((parts[number], *bounded))
                 done += int(parts[number].sum())
                 if progress is not None:
                     progress(done, len(run.poses))
         except KeyboardInterrupt:
             interrupted = True
-        _fill(run, block, found)
+        _fill(run, block, done_parts)
         if interrupted:
             break
     if interrupted and run.rows.count == 0:

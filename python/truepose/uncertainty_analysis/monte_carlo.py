@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose._kernel import Tallies
-from truepose.cluster.evaluator import Evaluator, Here, evaluator_of
+from truepose.cluster.evaluator import Here, TaskEvaluator, evaluator_of
 from truepose.cluster.options import requested_cluster
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -292,7 +292,7 @@ def _of_machine(
     poses: ArrayLike | None,
     condition: Condition | None,
     asked: _Options,
-    evaluator: Evaluator,
+    evaluator: TaskEvaluator,
     progress: Progress | None,
 ) -> xr.Dataset:
     run = Run(machine, poses, condition)
@@ -302,22 +302,22 @@ def _of_machine(
     account = _Account(progress, len(run.poses))
     interrupted = False
     for block, every in run.with_variables():
-        found: dict[int, _Sampled] = {}
+        by_part: dict[int, _Sampled] = {}
         listed = list(in_parts(block, every, POSES))
         # The part with the worst pose first: what is stopped early holds it.
         order = _worst_first(machine, block, every)
         try:
             for number, sampled in _sampled_parts(asked, listed, order, evaluator, account):
-                found[number] = sampled
+                by_part[number] = sampled
                 interrupted = interrupted or sampled.interrupted
                 if interrupted:
                     break
         except KeyboardInterrupt:
             interrupted = True
-        for number in sorted(found):
-            values = found[number].values
+        for number in sorted(by_part):
+            values = by_part[number].values
             if values is not None:
-                run.fill(listed[number][0], values, found[number].status)
+                run.fill(listed[number][0], values, by_part[number].status)
         if interrupted:
             break
     if interrupted and rows.count == 0:
@@ -346,12 +346,12 @@ _Part = tuple[PoseBlock, Variables]
 class _Sampled:
     """What the samples at some poses say: the values of each, and whether it can be used.
 
-    `values` is None where Ctrl-C came before there were any. `each`: samples at a pose.
+    `values` is None where Ctrl-C came before there were any. `per_pose`: samples at each.
     """
 
     values: Mapping[str, np.ndarray] | None
     status: np.ndarray
-    each: int
+    per_pose: int
     interrupted: bool
 
 
@@ -359,7 +359,7 @@ def _sampled_parts(
     asked: _Options,
     parts: Sequence[_Part],
     order: Sequence[int],
-    evaluator: Evaluator,
+    evaluator: TaskEvaluator,
     account: _Account,
 ) -> Iterator[tuple[int, _Sampled]]:
     """The number of each part and its samples, in the `order` here, as they come from workers."""
@@ -371,7 +371,7 @@ def _sampled_parts(
     for number, sampled in evaluator.results(sample, asked, tasks):
         n_pose = parts[number][0].indices.size
         if not here:
-            account.add(sampled.each * n_pose, sampled.each)
+            account.add(sampled.per_pose * n_pose, sampled.per_pose)
         account.finish(n_pose)
         yield number, sampled
 
@@ -399,7 +399,7 @@ def _sampled(
     return _Sampled(
         sampler.values(drawn.tallies, asked.probability),
         reason_unless(np.asarray(drawn.tallies.count) > 1, BAND),
-        drawn.each,
+        drawn.per_pose,
         drawn.interrupted,
     )
 

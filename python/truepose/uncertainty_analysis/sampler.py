@@ -217,7 +217,7 @@ class DrawnSamples:
 
     tallies: Tallies | None
     interrupted: bool
-    each: int = 0
+    per_pose: int = 0
     """Samples at each pose."""
 
 

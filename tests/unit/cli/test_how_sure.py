@@ -63,13 +63,15 @@ def test_montecarlo_asks_for_what_the_options_say(
     given = asked["monte_carlo"].settings
     assert given.pop("progress") is None
     defaults = {"samples": None, "digits": 1, "probability": 0.95, "seed": 0, "sampling": "random"}
-    assert given == defaults
+    nowhere = {"workers": None, "scheduler": None, "tls": None}
+    assert given == defaults | nowhere
     options = ["--samples=1e6", "--digits=2", "--probability=0.99", "--seed=4", "--sampling=sobol"]
     assert call(capsys, "montecarlo", PLANAR, *options).code == 0
     given = asked["monte_carlo"].settings
     del given["progress"]
     assert given == {
         "samples": 1_000_000, "digits": 2, "probability": 0.99, "seed": 4, "sampling": "sobol",
+        **nowhere,
     }  # fmt: skip
 
 

@@ -7,22 +7,18 @@ script that it preloads.
 
 from __future__ import annotations
 
-import json
-import os
 import random
 import re
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import truepose as tp
+from cluster_under_test import LIMIT, Cluster, started
 from command_line import PLANAR
 from sweeps import long_member
 from truepose.cluster.instruction_sets import computing_with
@@ -33,12 +29,6 @@ pytest.importorskip("distributed")
 pytest.importorskip("zarr")
 
 VARY = ["strut.*.length=380:520:4 mm", "condition.temperature=20:35:3 degC"]
-LIMIT = 250.0
-"""s; what hangs does so for good."""
-
-PATH = os.pathsep.join(str(Path(folder).resolve()) for folder in sys.path if folder)
-ENVIRONMENT = os.environ | {"PYTHONPATH": PATH, "TRUEPOSE_THREADS": "1"}
-
 pytestmark = pytest.mark.timeout(600)
 
 OTHER_VERSION = """
@@ -120,79 +110,6 @@ def whole() -> Any:
 @pytest.fixture
 def store(tmp_path: Path) -> Path:
     return tmp_path / "study.zarr"
-
-
-@contextmanager
-def started(words: list[str], **more: str) -> Iterator[subprocess.Popen[str]]:
-    """A process with its own children, which are all gone afterwards."""
-    process = subprocess.Popen(
-        words, env=ENVIRONMENT | more, text=True, start_new_session=True,
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
-    try:
-        yield process
-    finally:
-        with suppress(ProcessLookupError):  # whoever was left by one that ended
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        for stream in (process.stdout, process.stderr):
-            if stream is not None:
-                stream.close()
-
-
-class Cluster:
-    """A scheduler in a process of its own, and the workers that it is given."""
-
-    def __init__(self, folder: Path, stack: ExitStack) -> None:
-        self._folder, self._stack = folder, stack
-        file = folder / "scheduler.json"
-        stack.enter_context(
-            started(
-                [
-                    sys.executable,
-                    "-m",
-                    "distributed.cli.dask_scheduler",
-                    "--host",
-                    "127.0.0.1",
-                    "--port",
-                    "0",
-                    "--dashboard-address",
-                    "127.0.0.1:0",
-                    "--no-dashboard",
-                    "--scheduler-file",
-                    str(file),
-                ],
-            )
-        )
-        begun = time.monotonic()
-        while not file.exists() or not file.read_text().strip():
-            assert time.monotonic() - begun < LIMIT, "the scheduler does not start"
-            time.sleep(0.05)
-        self.address: str = json.loads(file.read_text())["address"]
-
-    def worker(self, name: str, *scripts: str, nanny: bool = False, **more: str) -> None:
-        preloads = []
-        for number, script in enumerate(scripts):
-            path = self._folder / f"{name}_{number}.py"
-            path.write_text(script)
-            preloads += ["--preload", str(path)]
-        words = [self.address, "--name", name, "--nthreads", "1", "--no-dashboard"]
-        words += ["--nanny" if nanny else "--no-nanny"]
-        words += ["--local-directory", str(self._folder / name), *preloads]
-        self._start("worker", words, **more)
-
-    def _start(self, what: str, words: list[str], **more: str) -> None:
-        module = f"distributed.cli.dask_{what}"
-        process = started([sys.executable, "-m", module, *words], **more)
-        self._stack.enter_context(process)
-
-
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Cluster]:
-    folder = tmp_path / "cluster"
-    folder.mkdir()
-    with ExitStack() as stack:
-        yield Cluster(folder, stack)
 
 
 KILLING = """

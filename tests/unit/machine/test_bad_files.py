@@ -183,7 +183,7 @@ CASES = [
     bad("grid-ends", "[200, 400, 5]", "[200, 400, 1]", "grid", "different ends",
         "found:    [200, 400, 1]"),
     bad("grid-too-large", "[200, 400, 5], y = [100, 300, 3]",
-        "[200, 400, 1000000], y = [100, 300, 1000000]", "grid", "1e+12 poses", "at most 1e7"),
+        "[200, 400, 1000000], y = [100, 300, 1000000]", "grid", "1e+12 poses", "at most 1e10"),
     bad("wrong-dimension", GRID, 'poses = [[200, "100 N"]]', "poses", "poses[0][1]"),
     bad("missing-key", GRID, "grid = {}", "grid", "names no freedom"),
     # stiffnesses, joints and masses

@@ -24,8 +24,8 @@ OTHERS = languages()[1:]
 ALIKE = {
     "de": {"CSV", "Live", "Position: {rest}", "Shapley", "Shapley, %", "dominant", "in", "linear",
            "linear, %", "relevant"},
-    "pt": {"CSV", "Shapley", "Shapley, %", "linear", "linear, %", "nominal", "pose", "singular",
-           "total", "total, %", "{count} pose"},
+    "pt": {"CSV", "Shapley", "Shapley, %", "linear", "linear, %", "nominal", "pose", "poses",
+           "singular", "total", "total, %", "{count} pose"},
 }  # fmt: skip
 """Translations that read as in English, on purpose."""
 

@@ -14,9 +14,10 @@ import xarray as xr
 import truepose as tp
 from build_machine import MACHINES
 from truepose.compensation import SCHEMA as COMPENSATION
-from truepose.error_budget.evaluate import SCHEMA as BUDGET
+from truepose.error_budget.at_poses import SCHEMA as BUDGET
 from truepose.error_budget.over_time import SCHEMA as OVER_TIME
 from truepose.error_budget.strain import SCHEMA as STRAIN
+from truepose.error_budget.summary import SUMMARY
 from truepose.machine.temperature_log import TemperatureLog
 from truepose.uncertainty_analysis.bounds import SCHEMA as BOUNDS
 from truepose.uncertainty_analysis.bounds_over_region import SCHEMA as REGION
@@ -53,6 +54,7 @@ def warm(machine: tp.Machine) -> tp.Condition:
 
 MADE: dict[str, Callable[[tp.Machine, np.ndarray], xr.Dataset]] = {
     "Budget": tp.budget,
+    "Summary of a budget": lambda machine, poses: tp.budget(machine, poses, summary=True),
     "Compensation": tp.compensate,
     "Over time": lambda machine, poses: tp.over_time(machine, poses, warm(machine)),
     "Internal forces": tp.strain,
@@ -78,6 +80,7 @@ def made(title: str, name: str) -> xr.Dataset:
 
 SCHEMAS = {
     "Budget": BUDGET,
+    "Summary of a budget": SUMMARY,
     "Compensation": COMPENSATION,
     "Over time": OVER_TIME,
     "Internal forces": STRAIN,

@@ -22,7 +22,7 @@ from truepose.machine import Machine
 from truepose.runs.first_order import ExactError
 from truepose.runs.poses import PoseRun, required_sources
 from truepose.runs.variables import variables_at
-from truepose.uncertainty_analysis import monte_carlo, stopping_rule
+from truepose.uncertainty_analysis import machine_sampler, monte_carlo, stopping_rule
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.model import FunctionModel
 from truepose.uncertainty_analysis.sampler import Random
@@ -401,7 +401,7 @@ def test_ctrl_c_before_any_sample_passes(monkeypatch: pytest.MonkeyPatch) -> Non
     def pressed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(f"{monte_carlo.__name__}._MachineSampler.begin", pressed)
+    monkeypatch.setattr(f"{machine_sampler.__name__}.MachineSampler.begin", pressed)
     monkeypatch.setattr(f"{monte_carlo.__name__}._FunctionSampler.sample", pressed)
     machine = load("planar_two_slider")
     with pytest.raises(KeyboardInterrupt):

@@ -29,5 +29,6 @@ BENCHMARKS = (
     Benchmark("calibration"),
     Benchmark("live_page", cores=2),
     Benchmark("studio", cores=2),
+    Benchmark("cluster", cores=2, usual=False),
     Benchmark("scaling", cores=2),
 )

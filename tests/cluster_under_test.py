@@ -40,10 +40,16 @@ def started(words: list[str], **more: str) -> Iterator[subprocess.Popen[str]]:
 class Cluster:
     """A scheduler in a process of its own, and the workers that it is given."""
 
-    def __init__(self, folder: Path, stack: ExitStack) -> None:
+    def __init__(self, folder: Path, stack: ExitStack, tls: Path | None = None) -> None:
+        """`tls`: a folder with ca.pem, cert.pem and key.pem, with which all are encrypted."""
         self._folder, self._stack = folder, stack
+        files = {"ca-file": "ca.pem", "cert": "cert.pem", "key": "key.pem"}
+        self._encrypted: list[str] = []
+        if tls is not None:
+            for option, name in files.items():
+                self._encrypted += [f"--tls-{option}", str(tls / name)]
         file = folder / "scheduler.json"
-        stack.enter_context(
+        self.scheduler = stack.enter_context(
             started(
                 [
                     sys.executable,
@@ -58,6 +64,7 @@ class Cluster:
                     "--no-dashboard",
                     "--scheduler-file",
                     str(file),
+                    *(["--protocol", "tls", *self._encrypted] if tls else []),
                 ],
             )
         )
@@ -74,6 +81,7 @@ class Cluster:
             path.write_text(script)
             preloads += ["--preload", str(path)]
         words = [self.address, "--name", name, "--nthreads", "1", "--no-dashboard"]
+        words += self._encrypted
         words += ["--nanny" if nanny else "--no-nanny"]
         words += ["--local-directory", str(self._folder / name), *preloads]
         self._start("worker", words, **more)

@@ -57,8 +57,8 @@ def command(
     exit code is 1 when it is not certain that the machine, commanded as it is, keeps the accuracy
     asked.
 
-    With --summary no row of a pose is kept, so that a grid may have 1e10 poses, and --workers or
-    --scheduler may share the work.
+    With --summary no row of a pose is kept, so that a grid may have 1e10 poses, and other
+    processes may share the work.
     """
     from truepose.cli import _steps
     from truepose.cluster.options import requested_cluster

@@ -31,6 +31,9 @@ ANSWER = 10.0
 NAMED = 8
 """Workers that a message names."""
 
+_NOISY = ("distributed", "tornado", "asyncio")
+"""Packages that log what an error of ours tells."""
+
 _FAILURES = (OSError, RuntimeError, TypeError, ValueError)
 """What dask.distributed raises where nobody answers, or not as it should."""
 
@@ -222,7 +225,9 @@ def connected(options: ClusterOptions) -> Iterator[Workers]:
 @contextmanager
 def _silent() -> Iterator[None]:
     """What goes wrong is told once, by an error of ours."""
-    loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
+    # Each by its name: some of those below have levels of their own.
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in _NOISY]
+    loggers = [logging.getLogger(name) for name in {*names, *_NOISY}]
     before = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)

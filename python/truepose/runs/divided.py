@@ -16,7 +16,7 @@ from truepose.runs.poses import BLOCK, PoseRun, Travel
 MOST_BLOCKS = 32
 """Blocks of a part at most: long enough for handing it out to cost little beside it."""
 
-FEWEST_PARTS = 8
+FEWEST_PARTS = 64
 """Parts of a run at least, as far as it has blocks: for workers to end at about the same time."""
 
 T = TypeVar("T")

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -167,6 +168,38 @@ def test_a_worker_that_dies_at_every_task_ends_it_with_its_name(
     (problem,) = json.loads(out)["problems"]
     assert problem["code"] == "worker-lost"
     assert problem["found"] == "1 worker lost: mortal"
+
+
+def test_an_encrypted_cluster(fine: Path, tmp_path: Path) -> None:
+    security = pytest.importorskip("distributed.security").Security.temporary()
+    tls, folder = tmp_path / "tls", tmp_path / "cluster"
+    tls.mkdir()
+    folder.mkdir()
+    (tls / "ca.pem").write_text(security.tls_ca_file)
+    (tls / "cert.pem").write_text(security.tls_client_cert)
+    (tls / "key.pem").write_text(security.tls_client_key)
+    command = ("budget", str(fine), "--summary")
+    with ExitStack() as stack:
+        cluster = Cluster(folder, stack, tls)
+        assert cluster.address.startswith("tls://")
+        cluster.worker("one")
+        assert told(*command, "--scheduler", cluster.address, "--tls", str(tls)) == told(*command)
+
+
+def test_a_scheduler_that_dies_on_the_way_ends_it(cluster: Cluster, tmp_path: Path) -> None:
+    tenth = tmp_path / "tenth"
+    cluster.worker("slow", SLOW, TOLD=str(tenth))
+    command = words("montecarlo", str(HEXAPOD), "--samples", "50")
+    begun = time.monotonic()
+    with started([*command, "--scheduler", cluster.address]) as process:
+        while not tenth.exists():
+            assert time.monotonic() - begun < LIMIT, "no tenth part is begun"
+            time.sleep(0.05)
+        cluster.scheduler.kill()
+        out, err = process.communicate(timeout=LIMIT)
+    assert process.returncode == 2, err
+    assert [problem["code"] for problem in json.loads(out)["problems"]] == ["no-scheduler"]
+    assert "Traceback" not in err
 
 
 def test_ctrl_c_gives_what_is_sampled_by_then(cluster: Cluster, tmp_path: Path) -> None:

@@ -1,0 +1,229 @@
+"""Workers: what two gain over one, what a task costs beside its work, and memory for 1e8 poses.
+
+`python -m benchmarks.cluster COUNT` sums up a planar machine of COUNT x COUNT poses on two workers
+of its own, and says what memory the client, the scheduler in it and its workers took at most.
+
+What a thousand workers would do is simulated from what a task costs here: the client, which hands
+out tasks one by one and takes their results, is the one that is never more than one.
+"""
+
+from __future__ import annotations
+
+import heapq
+import json
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import truepose
+from benchmarks.gcode import ROOT
+from benchmarks.rows import Row
+from truepose.cluster.evaluator import OnWorkers, TaskEvaluator, evaluator_of
+from truepose.cluster.options import ClusterOptions
+from truepose.error_budget.summary import summary
+from truepose.machine import Machine
+from truepose.runs.divided import MOST_BLOCKS
+from truepose.runs.poses import BLOCK
+
+GRID = "[workspace]\ngrid = {{ x = [200, 400, {count}], y = [100, 300, {count}] }}\n\n"
+FEW, MANY, ASKED_MEMORY = 1000, 10_000, 1.1
+SIDE, ROUNDS, ASKED_GAIN = 14, 5, 1.8
+TASKS, LONG = 2000, 1 << 20
+WORKERS, POSES, VARIANTS = 1000, 10**9, 10**5
+
+
+def measure() -> list[Row]:
+    """In wall time, on the cores that it is given."""
+    return [*_gain(), *_memory(), *_cost()]
+
+
+def planar(folder: Path, count: int) -> Machine:
+    """The planar machine with `count` x `count` poses."""
+    text = (ROOT / "machines" / "planar_two_slider.toml").read_text(encoding="utf-8")
+    grid = GRID.format(count=count)
+    path = folder / "planar.toml"
+    path.write_text(re.sub(r"(?m)^\[workspace\]\n(?:(?!\[).*\n)*", grid, text), encoding="utf-8")
+    return truepose.load(path)
+
+
+def _gain() -> list[Row]:
+    """One worker and two, in turns, each connected before, and the same numbers of both."""
+    ends = {"x": (-4, 4), "y": (-4, 4), "z": (18, 22), "a": (-10, 10), "b": (-10, 10)}
+    axes = ", ".join(f"{name} = [{low}, {high}, {SIDE}]" for name, (low, high) in ends.items())
+    settings = [f"workspace.grid={{ {axes} }}"]
+    machine = truepose.load(ROOT / "machines" / "hexapod.toml", settings=settings)
+    times: dict[int, float] = {1: float("inf"), 2: float("inf")}
+    with ExitStack() as stack:
+        of = {count: stack.enter_context(evaluator_of(ClusterOptions(count))) for count in times}
+        summaries = {count: _summed(machine, evaluator) for count, evaluator in of.items()}
+        if not summaries[1].identical(summaries[2]):
+            raise RuntimeError("two workers give other numbers than one")
+        for _ in range(ROUNDS):
+            for count, evaluator in of.items():
+                begun = time.perf_counter()
+                _summed(machine, evaluator)
+                times[count] = min(times[count], time.perf_counter() - begun)
+    n_pose = int(summaries[1].attrs["poses_used"])
+    return [
+        Row(
+            "cluster, two workers over one",
+            times[1] / times[2],
+            "x",
+            "at least",
+            ASKED_GAIN,
+            f"summary of the hexapod, {n_pose:,} poses: {times[1]:.2f} s, {times[2]:.2f} s, best "
+            f"of {ROUNDS} in turns; client and scheduler on the same two cores",
+        )
+    ]
+
+
+def _summed(machine: Machine, evaluator: TaskEvaluator) -> object:
+    return summary(machine, None, None, None, evaluator)
+
+
+def _memory() -> list[Row]:
+    few, many = (_of_process(count) for count in (FEW, MANY))
+    rate = MANY**2 / many["seconds"]
+    return [
+        Row(
+            f"cluster, peak memory of client and scheduler for {MANY**2:.0e} poses to that for "
+            f"{FEW**2:.0e}",
+            many["mib"] / few["mib"],
+            "x",
+            "at most",
+            ASKED_MEMORY,
+            f"planar_two_slider, two workers: {many['mib']:.0f} MiB, {few['mib']:.0f} MiB; of the "
+            f"larger of its workers {many['workers']:.0f} MiB, {few['workers']:.0f} MiB",
+        ),
+        Row(
+            "cluster, summary of the planar machine on two workers",
+            rate,
+            "poses/s",
+            "at least",
+            None,
+            f"{MANY**2:,} poses, {many['seconds']:.0f} s",
+        ),
+    ]
+
+
+def _of_process(count: int) -> dict[str, float]:
+    run = subprocess.run(
+        [sys.executable, "-m", "benchmarks.cluster", str(count)],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    answer: dict[str, float] = json.loads(run.stdout)
+    return answer
+
+
+def _here(count: int) -> dict[str, float]:
+    with tempfile.TemporaryDirectory() as folder:
+        machine = planar(Path(folder), count)
+    begun = time.perf_counter()
+    found = truepose.budget(machine, summary=True, workers=2)
+    seconds = time.perf_counter() - begun
+    if found.attrs["poses_used"] != count**2:
+        raise RuntimeError("some poses are left out")
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    own, children = (
+        resource.getrusage(who).ru_maxrss / unit
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    return {"mib": own, "workers": children, "seconds": seconds}
+
+
+def _cost() -> list[Row]:
+    """A task that does nothing, and one that gives back a mebibyte; then the simulation."""
+    with evaluator_of(ClusterOptions(2)) as evaluator:
+        assert isinstance(evaluator, OnWorkers)
+        _drained(evaluator, 0, 20)
+        empty = min(_drained(evaluator, 0, TASKS) for _ in range(3)) / TASKS
+        long = min(_drained(evaluator, LONG, 200) for _ in range(3)) / 200
+    byte = max(long - empty, 0.0) / LONG
+    with tempfile.TemporaryDirectory() as folder:
+        machine = planar(Path(folder), 1000)
+    begun = time.perf_counter()
+    truepose.budget(machine, summary=True)
+    planar_pose = 2.0 * (time.perf_counter() - begun) / 1e6  # two threads here, one a worker
+    rows = [
+        Row(
+            "cluster, handing out a task and taking its result",
+            1e3 * empty,
+            "ms",
+            "at most",
+            None,
+            f"{TASKS:,} tasks that do nothing, client, scheduler and two workers on two cores; "
+            f"{1e9 * byte:.2f} ns a byte of the result more",
+        )
+    ]
+    works = (
+        Work(
+            "planar, 1e9 poses", POSES // (BLOCK * MOST_BLOCKS), BLOCK * MOST_BLOCKS * planar_pose
+        ),
+        Work("planar, 1e9 poses, a block a task", POSES // BLOCK, BLOCK * planar_pose),
+        Work("1e5 variants of 1 s, ten a task", VARIANTS // 10, 10.0),
+        Work("1e5 variants of 1 s, one a task", VARIANTS, 1.0),
+    )
+    for work in works:
+        seconds = simulated(work, WORKERS, empty)
+        ideal = work.tasks * work.seconds / WORKERS
+        rows.append(
+            Row(
+                f"cluster, simulated: {work.name}, {WORKERS:,} workers, busy for",
+                100.0 * ideal / seconds,
+                "%",
+                "at least",
+                None,
+                f"{work.tasks:,} tasks of {work.seconds:.3g} s: {seconds:.0f} s; the client "
+                f"keeps {work.seconds / empty:,.0f} workers busy",
+            )
+        )
+    return rows
+
+
+@dataclass(frozen=True)
+class Work:
+    """So many tasks, each of so many seconds for a worker."""
+
+    name: str
+    tasks: int
+    seconds: float
+
+
+def simulated(work: Work, workers: int, cost: float) -> float:
+    """s until all tasks are done: a client that takes `cost` s a task, and workers that wait."""
+    ready = [0.0] * min(workers, work.tasks)
+    client, last = 0.0, 0.0
+    for _ in range(work.tasks):
+        client = max(client, heapq.heappop(ready)) + cost
+        last = client + work.seconds
+        heapq.heappush(ready, last)
+    return max(last, *ready)
+
+
+def nothing(shared: object, size: int) -> bytes:
+    """What a worker does that is asked for so many bytes."""
+    return bytes(size)
+
+
+def _drained(evaluator: OnWorkers, size: int, count: int) -> float:
+    def tasks() -> Iterator[tuple[int, int]]:
+        for number in range(count):
+            yield number, size
+
+    begun = time.perf_counter()
+    for _ in evaluator.results(nothing, None, tasks()):
+        pass
+    return time.perf_counter() - begun
+
+
+if __name__ == "__main__":
+    print(json.dumps(_here(int(sys.argv[1]))))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+from build_machine import MACHINES
 from truepose.machine import Machine, load
 from truepose.sources import REGISTRY
 
@@ -115,3 +117,15 @@ def load_text(folder: Path, text: str, *settings: str) -> Machine:
     path = folder / "machine.toml"
     path.write_text(text, encoding="utf-8")
     return load(path, settings=settings, registry=REGISTRY)
+
+
+def with_workspace(name: str, folder: Path, workspace: str) -> Path:
+    """The file of a machine of the library, with other poses."""
+    text = (MACHINES / f"{name}.toml").read_text(encoding="utf-8")
+    text, count = re.subn(
+        r"(?m)^\[workspace\]\n(?:(?!\[).*\n)*", f"[workspace]\n{workspace}\n\n", text
+    )
+    assert count == 1
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -6,24 +6,24 @@ As in `test_study`, nothing of dask.distributed runs in the process of the tests
 from __future__ import annotations
 
 import json
-import re
 import signal
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 
 from build_machine import MACHINES
 from cluster_under_test import ENVIRONMENT, LIMIT, Cluster, started
+from machine_texts import with_workspace
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.timeout(600)
 
 PLANAR, HEXAPOD = MACHINES / "planar_two_slider.toml", MACHINES / "hexapod.toml"
-FINE = "workspace.grid={ x = [100, 500, 400], y = [50, 400, 300] }"
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "budget": ("budget", "FINE", "--summary"),
@@ -33,7 +33,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bounds": ("bounds", str(PLANAR)),
 }
 
-LITTLE = """
+OLDER = """
 from truepose.cluster import in_worker
 
 def dask_setup(worker):
@@ -91,15 +91,8 @@ if __name__ == "__main__":
 @pytest.fixture
 def fine(tmp_path: Path) -> Path:
     """The planar machine with 120,000 poses: 15 blocks."""
-    text, count = re.subn(
-        r"(?m)^\[workspace\]\n(?:(?!\[).*\n)*",
-        "[workspace]\ngrid = { x = [100, 500, 400], y = [50, 400, 300] }\n\n",
-        PLANAR.read_text(encoding="utf-8"),
-    )
-    assert count == 1
-    path = tmp_path / "fine.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+    grid = "grid = { x = [100, 500, 400], y = [50, 400, 300] }"
+    return with_workspace("planar_two_slider", tmp_path, grid)
 
 
 def words(*of_command: str) -> list[str]:
@@ -118,6 +111,20 @@ def told(*of_command: str) -> str:
     )
     assert (done.returncode, done.stderr) == (0, ""), done.stderr
     return done.stdout
+
+
+@contextmanager
+def sampling(cluster: Cluster, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """A command whose slow worker samples the tenth of 22 parts."""
+    tenth = folder / "tenth"
+    cluster.worker("slow", SLOW, TOLD=str(tenth))
+    command = words("montecarlo", str(HEXAPOD), "--samples", "50")
+    begun = time.monotonic()
+    with started([*command, "--scheduler", cluster.address]) as process:
+        while not tenth.exists():
+            assert time.monotonic() - begun < LIMIT, "no tenth part is begun"
+            time.sleep(0.05)
+        yield process
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -149,7 +156,7 @@ def test_a_worker_that_is_refused_is_named_in_python(
     script = tmp_path / "warned.py"
     script.write_text(WARNED)
     cluster.worker("good")
-    cluster.worker("older", LITTLE)
+    cluster.worker("older", OLDER)
     done = subprocess.run(
         [sys.executable, str(script), str(fine), cluster.address],
         env=ENVIRONMENT, capture_output=True, text=True, timeout=LIMIT, check=False,
@@ -187,14 +194,7 @@ def test_an_encrypted_cluster(fine: Path, tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_dies_on_the_way_ends_it(cluster: Cluster, tmp_path: Path) -> None:
-    tenth = tmp_path / "tenth"
-    cluster.worker("slow", SLOW, TOLD=str(tenth))
-    command = words("montecarlo", str(HEXAPOD), "--samples", "50")
-    begun = time.monotonic()
-    with started([*command, "--scheduler", cluster.address]) as process:
-        while not tenth.exists():
-            assert time.monotonic() - begun < LIMIT, "no tenth part is begun"
-            time.sleep(0.05)
+    with sampling(cluster, tmp_path) as process:
         cluster.scheduler.kill()
         out, err = process.communicate(timeout=LIMIT)
     assert process.returncode == 2, err
@@ -203,14 +203,7 @@ def test_a_scheduler_that_dies_on_the_way_ends_it(cluster: Cluster, tmp_path: Pa
 
 
 def test_ctrl_c_gives_what_is_sampled_by_then(cluster: Cluster, tmp_path: Path) -> None:
-    tenth = tmp_path / "tenth"
-    cluster.worker("slow", SLOW, TOLD=str(tenth))
-    command = words("montecarlo", str(HEXAPOD), "--samples", "50")
-    begun = time.monotonic()
-    with started([*command, "--scheduler", cluster.address]) as process:
-        while not tenth.exists():
-            assert time.monotonic() - begun < LIMIT, "no tenth part is begun"
-            time.sleep(0.05)
+    with sampling(cluster, tmp_path) as process:
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=LIMIT)
     assert process.returncode == 130, err

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import truepose as tp
 from build_machine import MACHINES
 from command_line import call
 from guided_machines import guided
+from machine_texts import with_workspace
 from truepose.error_budget.summary import SUMMARY
 from truepose.errors import RequestError
 from truepose.runs import divided, poses
@@ -34,18 +34,6 @@ EVERY = sorted(path.stem for path in MACHINES.glob("*.toml"))
 WIDE = "grid = { x = [-300, 900, 41], y = [-200, 700, 33] }"
 FINE = "grid = { x = [200, 400, 20001], y = [100, 300, 10001] }"
 ZIGZAG = "path = { points = [[-50, 0, 50], [50, 10, 90], [-50, 20, 50], [50, 30, 90]], step = 1 }"
-
-
-def with_workspace(name: str, folder: Path, workspace: str) -> Path:
-    """The file of a machine of the library, with other poses."""
-    text = (MACHINES / f"{name}.toml").read_text(encoding="utf-8")
-    text, count = re.subn(
-        r"(?m)^\[workspace\]\n(?:(?!\[).*\n)*", f"[workspace]\n{workspace}\n\n", text
-    )
-    assert count == 1
-    path = folder / f"{name}.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def same_numbers(summary: Any, budget: Any) -> None:

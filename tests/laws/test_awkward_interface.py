@@ -151,7 +151,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "Machine.forward": (MACHINE.forward, {"joints": JOINTS}),
 }  # fmt: skip
 
-NO_ARGUMENT = {"poses", "joint_units"}
+NO_ARGUMENT = {"poses", "pose_table", "joint_units"}
 """Methods of a machine without any."""
 
 

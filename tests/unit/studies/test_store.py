@@ -17,8 +17,8 @@ import pytest
 
 import truepose as tp
 from command_line import PLANAR
+from truepose.cluster import evaluator
 from truepose.errors import RequestError
-from truepose.studies import evaluators
 from truepose.studies import store as stores
 from truepose.studies import study as studies
 from truepose.studies.lock import lock_file, only_writer
@@ -229,7 +229,7 @@ def test_it_goes_on_with_the_instructions_it_was_begun_with(
 ) -> None:
     from truepose._kernel import instruction_set
 
-    monkeypatch.setattr(evaluators, "instruction_set", lambda: "scalar")
+    monkeypatch.setattr(evaluator, "instruction_set", lambda: "scalar")
     with pytest.raises(StopError):
         broken_off(store, 3, StopError())
     monkeypatch.undo()
@@ -242,7 +242,7 @@ def test_it_goes_on_with_the_instructions_it_was_begun_with(
 def test_instructions_that_are_not_here_are_refused(
     store: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(evaluators, "instruction_set", lambda: "scalar")
+    monkeypatch.setattr(evaluator, "instruction_set", lambda: "scalar")
     tp.study(PLANAR, VARY, output=store)
     zarr.open_group(str(store), mode="r+").attrs["study"] = (
         StudyStore(store).attrs["study"].replace('"scalar"', '"avx1024"')

@@ -11,7 +11,7 @@ import pickle
 import queue
 import time
 from collections import defaultdict, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -89,9 +89,12 @@ class _HandingOut:
             more = self._give(tasks) and more
             if not (self._under_way or self._again or more):
                 return
-            for number, future in self._come():
-                given = self._under_way.get(number)
-                if given is not None and given.future is future:
+            ended = dict(self._ended())
+            fetched = self._fetched(ended)
+            for number, given in ended.items():
+                if number in fetched:
+                    yield self._done(number, given, fetched[number])
+                elif self._under_way.get(number) is given:
                     yield from self._taken(number, given)
 
     def _look(self, *, now: bool = False) -> None:
@@ -137,14 +140,56 @@ class _HandingOut:
         self._names[address] = self._workers.usable[address].name
         future.add_done_callback(lambda done: self._ready.put((number, done)))
 
-    def _come(self) -> Iterator[tuple[int, Future]]:
-        """What has ended; nothing after a while in which nothing has."""
+    def _ended(self) -> Iterator[tuple[int, _Given]]:
+        """Tasks that have ended; none after a while in which none has."""
+        wait: float | None = LOOK
+        while True:
+            try:
+                number, future = self._ready.get(wait is not None, wait)
+            except queue.Empty:
+                return
+            given = self._under_way.get(number)
+            if given is not None and given.future is future:
+                yield number, given
+            wait = None
+
+    def _fetched(self, ended: Mapping[int, _Given]) -> dict[int, Any]:
+        """The results of tasks that have ended, in one question; none where one is not there.
+
+        A question costs the client as much as all else of a task.
+        """
+        from distributed import CancelledError
+
+        futures = {
+            number: given.future
+            for number, given in ended.items()
+            if given.future.status == "finished"
+        }
+        if len(futures) < 2:
+            return {}
+        client = self._workers.client
+
+        async def gathered() -> list[Any]:
+            values: list[Any] = await client.gather(
+                list(futures.values()), errors="skip", asynchronous=True
+            )
+            return values
+
         try:
-            yield self._ready.get(timeout=LOOK)
-            while True:
-                yield self._ready.get_nowait()
-        except queue.Empty:
-            return
+            values = client.sync(gathered, callback_timeout=RESULT)
+        except (OSError, CancelledError):
+            return {}
+        if len(values) < len(futures):
+            return {}
+        return dict(zip(futures, values, strict=True))
+
+    def _done(self, number: int, given: _Given, result: Any) -> tuple[int, Any]:
+        """A task is done: its number and its result."""
+        del self._under_way[number]
+        self._doing[given.address].discard(number)
+        self._lost_with.pop(number, None)
+        self._deaths.pop(self._names[given.address], None)
+        return number, result
 
     def _taken(self, number: int, given: _Given) -> Iterator[tuple[int, Any]]:
         """The result of a task that has ended, or nothing where it is to be computed again."""
@@ -165,11 +210,7 @@ class _HandingOut:
             except (OSError, CancelledError):  # its worker went with it
                 pass
             else:
-                del self._under_way[number]
-                self._doing[given.address].discard(number)
-                self._lost_with.pop(number, None)
-                self._deaths.pop(self._names[given.address], None)
-                yield number, result
+                yield self._done(number, given, result)
                 return
         self._look(now=True)
         if self._under_way.get(number) is given:  # the worker is there, and has it no more

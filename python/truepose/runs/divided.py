@@ -13,10 +13,10 @@ from typing import Any, TypeVar
 from truepose.cluster.evaluator import TaskEvaluator
 from truepose.runs.poses import BLOCK, PoseRun, Travel
 
-MOST_BLOCKS = 32
+MOST_BLOCKS = 256
 """Blocks of a part at most: long enough for handing it out to cost little beside it."""
 
-FEWEST_PARTS = 64
+FEWEST_PARTS = 32
 """Parts of a run at least, as far as it has blocks: for workers to end at about the same time."""
 
 T = TypeVar("T")

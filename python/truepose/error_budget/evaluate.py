@@ -66,7 +66,7 @@ def budget(
         raise RequestError(
             Problem(
                 "bad-workers",
-                "workers are for a summary: rows of single poses take longer to send than to "
+                "workers are for a summary: rows of single poses take about as long to fetch as to "
                 "compute",
                 found=f"{cluster.workers or cluster.scheduler} without a summary",
                 expected="--summary, summary=True",

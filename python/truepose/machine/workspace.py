@@ -79,7 +79,7 @@ class Workspace:
 
     def table(self) -> PoseTable:
         """The same, of a grid each pose made where it is looked at."""
-        return GridPoses(self.axes) if self.listed is None else self.listed
+        return GridPoses(self.axes) if self.listed is None else self.listed.copy()
 
 
 @dataclass(frozen=True)

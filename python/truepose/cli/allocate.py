@@ -20,10 +20,6 @@ from truepose.cli._options import (
 from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from truepose.design.cost_curve import CostCurve
-    from truepose.design.result import Allocation
     from truepose.machine import Machine
 
 ENDING = ".toml"
@@ -179,15 +175,16 @@ def command(
     if curve is not None:
         if output is not None:
             raise click.UsageError("--curve has several designs: it goes without --output.")
-        return _curve(request, machine, curve, asked, page)
+        return _curve(request, machine, curve, asked, report_file)
     with progress("allocation", "programmes", first="a design of the finest grades") as report:
         allocation = truepose.allocate(
             machine, **asked, alternatives=alternatives, region=region, progress=report
         )
     if allocation.interrupted:
         click.echo(words.interrupted(allocation), err=True)
-    if page is not None:
-        page.design(allocation)
+    if page is not None and report_file is not None:
+        page.write(allocation, report_file)
+        _steps.note_written(report_file)
     beside = [] if output is None else [(output, allocation.text(output))]
     if request.format == "table":
         for sentence in words.sentences(allocation):
@@ -206,37 +203,18 @@ def command(
     return INTERRUPTED if allocation.interrupted else 0
 
 
-class _Page:
-    """The page that is wanted: of a design or of a curve."""
-
-    def __init__(self, path: Path, module: Any) -> None:
-        self._path, self._module = path, module
-
-    def design(self, allocation: Allocation) -> None:
-        """Write that of a design."""
-        self._write(self._module.write, allocation)
-
-    def curve(self, curve: CostCurve) -> None:
-        """Write that of costs against targets."""
-        self._write(self._module.write_curve, curve)
-
-    def _write(self, write: Callable[[Any, Path], None], result: object) -> None:
-        from truepose.cli._steps import note_written
-
-        write(result, self._path)
-        note_written(self._path)
-
-
-def _page(path: Path, machine_file: Path) -> _Page:
-    """What will write the page, found before any work."""
+def _page(path: Path, machine_file: Path) -> Any:
+    """The module that writes the page, before any work."""
     from truepose.files.writing import require_writable
     from truepose.reporting.drawing_packages import module_that_draws
 
     require_writable(path, (".html",), [machine_file])
-    return _Page(path, module_that_draws("truepose.reporting.allocation_page"))
+    return module_that_draws("truepose.reporting.allocation_page")
 
 
-def _curve(request: Request, machine: Machine, text: str, asked: Asked, page: _Page | None) -> int:
+def _curve(
+    request: Request, machine: Machine, text: str, asked: Asked, report_file: Path | None
+) -> int:
     """Costs against targets -> exit code."""
     from truepose.cli import _steps
     from truepose.cli._progress import progress
@@ -249,8 +227,9 @@ def _curve(request: Request, machine: Machine, text: str, asked: Asked, page: _P
         curve = cost_curve(machine, targets, **asked, progress=report)
     if curve.interrupted:
         click.echo(f"Interrupted after {len(curve.points)} of {len(targets)} targets.", err=True)
-    if page is not None:
-        page.curve(curve)
+    if report_file is not None:
+        _page(report_file, request.machine_file).write_curve(curve, report_file)
+        _steps.note_written(report_file)
     _steps.deliver(request, Result("allocate", machine, curve.dataset), [words.curve(curve)])
     return INTERRUPTED if curve.interrupted else 0
 

@@ -11,16 +11,13 @@ from __future__ import annotations
 
 import heapq
 import json
-import re
 import resource
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 
 import truepose
 from benchmarks.gcode import ROOT
@@ -32,7 +29,6 @@ from truepose.machine import Machine
 from truepose.runs.divided import MOST_BLOCKS
 from truepose.runs.poses import BLOCK
 
-GRID = "[workspace]\ngrid = {{ x = [200, 400, {count}], y = [100, 300, {count}] }}\n\n"
 FEW, MANY, ASKED_MEMORY = 1000, 10_000, 1.1
 SIDE, ROUNDS, ASKED_GAIN = 20, 5, 1.8
 TASKS, LONG = 2000, 1 << 20
@@ -45,13 +41,10 @@ def measure() -> list[Row]:
     return [gain, *_memory(), *_cost(pose)]
 
 
-def planar(folder: Path, count: int) -> Machine:
+def planar(count: int) -> Machine:
     """The planar machine with `count` x `count` poses."""
-    text = (ROOT / "machines" / "planar_two_slider.toml").read_text(encoding="utf-8")
-    grid = GRID.format(count=count)
-    path = folder / "planar.toml"
-    path.write_text(re.sub(r"(?m)^\[workspace\]\n(?:(?!\[).*\n)*", grid, text), encoding="utf-8")
-    return truepose.load(path)
+    grid = f"workspace.grid={{ x = [200, 400, {count}], y = [100, 300, {count}] }}"
+    return truepose.load(ROOT / "machines" / "planar_two_slider.toml", settings=[grid])
 
 
 def _gain() -> tuple[Row, float]:
@@ -128,8 +121,7 @@ def _of_process(count: int) -> dict[str, float]:
 
 
 def _here(count: int) -> dict[str, float]:
-    with tempfile.TemporaryDirectory() as folder:
-        machine = planar(Path(folder), count)
+    machine = planar(count)
     begun = time.perf_counter()
     found = truepose.budget(machine, summary=True, workers=2)
     seconds = time.perf_counter() - begun
@@ -156,8 +148,7 @@ def _cost(pose: float) -> list[Row]:
         )
         long = min(_drained(evaluator, LONG, 200)[1] for _ in range(3)) / 200
     byte = max(long - empty, 0.0) / LONG
-    with tempfile.TemporaryDirectory() as folder:
-        machine = planar(Path(folder), 1000)
+    machine = planar(1000)
     begun = time.perf_counter()
     truepose.budget(machine, summary=True)
     planar_pose = 2.0 * (time.perf_counter() - begun) / 1e6  # two threads here, one a worker

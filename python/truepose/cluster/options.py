@@ -130,4 +130,22 @@ def _of_folder(folder: Path) -> list[Problem]:
     ]
 
 
-__all__ = ["TLS_FILES", "ClusterOptions", "RefusedWorkerWarning", "requested_cluster"]
+def refuse_workers(cluster: ClusterOptions, why: str, asked: str, expected: str) -> RequestError:
+    """The error (bad-workers) where what is asked for is not shared by workers; `asked`: what."""
+    return RequestError(
+        Problem(
+            "bad-workers",
+            why,
+            found=f"{cluster.workers or cluster.scheduler} {asked}",
+            expected=expected,
+        )
+    )
+
+
+__all__ = [
+    "TLS_FILES",
+    "ClusterOptions",
+    "RefusedWorkerWarning",
+    "refuse_workers",
+    "requested_cluster",
+]

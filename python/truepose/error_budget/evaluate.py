@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from truepose.cluster.evaluator import evaluator_of
-from truepose.cluster.options import requested_cluster
+from truepose.cluster.options import refuse_workers, requested_cluster
 from truepose.error_budget.at_poses import SCHEMA, evaluate_block
 from truepose.error_budget.tally import Tally
-from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.arguments import checked
 from truepose.runs.dataset import label, quantity_coords
@@ -63,14 +62,12 @@ def budget(
         with evaluator_of(cluster) as evaluator:
             return summary_of(machine, poses, condition, progress, evaluator)
     if cluster is not None:
-        raise RequestError(
-            Problem(
-                "bad-workers",
-                "workers are for a summary: rows of single poses take about as long to fetch as to "
-                "compute",
-                found=f"{cluster.workers or cluster.scheduler} without a summary",
-                expected="--summary, summary=True",
-            )
+        raise refuse_workers(
+            cluster,
+            "workers are for a summary: rows of single poses take about as long to fetch as to "
+            "compute",
+            "without a summary",
+            "--summary, summary=True",
         )
     return evaluate(machine, poses, condition, progress).dataset()
 

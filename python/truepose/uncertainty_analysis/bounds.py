@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
 from truepose.cluster.evaluator import TaskEvaluator, evaluator_of
-from truepose.cluster.options import requested_cluster
+from truepose.cluster.options import refuse_workers, requested_cluster
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -131,13 +131,11 @@ def bounds(
         with evaluator_of(cluster) as evaluator:
             return _at_poses(machine, poses, given, ends, evaluator, progress)
     if cluster is not None:
-        raise RequestError(
-            Problem(
-                "bad-workers",
-                "workers share poses, and a region is one search",
-                found=f"{cluster.workers or cluster.scheduler} over a region",
-                expected="bounds at poses, or no workers",
-            )
+        raise refuse_workers(
+            cluster,
+            "workers share poses, and a region is one search",
+            "over a region",
+            "bounds at poses, or no workers",
         )
     if poses is not None:
         raise RequestError(

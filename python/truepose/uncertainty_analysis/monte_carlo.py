@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from truepose._kernel import Tallies
 from truepose.cluster.evaluator import Here, TaskEvaluator, evaluator_of
-from truepose.cluster.options import requested_cluster
+from truepose.cluster.options import refuse_workers, requested_cluster
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.arguments import checked
@@ -230,13 +230,11 @@ def monte_carlo(
         with evaluator_of(cluster) as evaluator:
             return _of_machine(model, poses, condition, asked, evaluator, progress)
     if cluster is not None:
-        raise RequestError(
-            Problem(
-                "bad-workers",
-                "workers share the poses of a machine, and a function has none",
-                found=f"{cluster.workers or cluster.scheduler} for a function",
-                expected="a machine, or no workers",
-            )
+        raise refuse_workers(
+            cluster,
+            "workers share the poses of a machine, and a function has none",
+            "for a function",
+            "a machine, or no workers",
         )
     of = FunctionModel(model, poses if inputs is None else inputs, correlation)
     return _of_function(of, asked, progress)

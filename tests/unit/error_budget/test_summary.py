@@ -17,6 +17,7 @@ from build_machine import MACHINES
 from command_line import call
 from guided_machines import guided
 from machine_texts import with_workspace
+from truepose.error_budget import summary
 from truepose.error_budget.summary import SUMMARY
 from truepose.errors import RequestError
 from truepose.runs import divided, poses
@@ -63,7 +64,7 @@ def same_numbers(summary: Any, budget: Any) -> None:
 
 @pytest.fixture
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (poses, divided, tp.error_budget.summary):
+    for module in (poses, divided, summary):
         monkeypatch.setattr(module, "BLOCK", 16)
 
 
@@ -105,6 +106,24 @@ def test_what_guides_carry_is_the_most_of_all_parts() -> None:
         budget = tp.budget(machine, given, loaded)
         assert "carries up to" in budget.attrs["warnings"]
         same_numbers(tp.budget(machine, given, loaded, summary=True), budget)
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_of_poses_with_the_same_error_the_first_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    evaluated = summary.evaluate_block
+
+    def alike(*given: Any) -> Any:
+        usable = evaluated(*given)
+        given[3]["linear_maximum"][:] = 1e-3
+        return usable
+
+    monkeypatch.setattr(summary, "evaluate_block", alike)
+    machine = tp.load(with_workspace("planar_two_slider", tmp_path, WIDE))
+    told = tp.budget(machine, summary=True)
+    first = machine.poses()[tp.budget(machine)["pose"].values[0]]
+    assert told["highest_at"].values.tolist() == [first.tolist()]
 
 
 @pytest.mark.usefixtures("small_blocks")
@@ -201,9 +220,9 @@ def test_where_no_pose_is_left_it_says_why(tmp_path: Path) -> None:
     )
     machine = tp.load(path)
     told = []
-    for summary in (False, True):
+    for summed in (False, True):
         with pytest.raises(RequestError) as refused:
-            tp.budget(machine, summary=summary)
+            tp.budget(machine, summary=summed)
         told.append(refused.value.problems)
     assert told[0] == told[1]
     assert told[0][0].code == "no-pose-left"

@@ -239,7 +239,7 @@ class Machine:
         yielding: Sequence[tuple[int, tuple[float, float], float, int]],
         wrench: Sequence[float],
         columns: Sequence[tuple[int, int, float]],
-        gap: float,
+        close: tuple[float, tuple[float, float] | None],
         most_boxes: int,
         earlier: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, int] | None,
         progress: Callable[[int, float], bool],
@@ -248,9 +248,11 @@ class Machine:
 
         `shifts` and `yielding`, a known deviation and a compliance under `wrench` (6,): parameter,
         (low, high) of a constant, per length of a strut, which strut. `columns`: parameter,
-        variable, swing. `earlier`: how far an earlier search was, `part_sides`, `part_bound`,
-        `finished`, `reached`, `at` and `boxes` of its dict. Where `progress(boxes, share)`, told
-        which share of the region is finished, returns False the search ends; so it does at
+        variable, swing. `close`: the gap, and sizes of position (m) and orientation (rad) that
+        nothing may be above, where that is the question. `earlier`: how far an earlier search was,
+        `part_sides`, `part_bound`, `finished`, `reached`, `at` and `boxes` of its dict. Where
+        `progress(boxes, share)`, told which
+        share of the region is finished, returns False the search ends; so it does at
         Ctrl-C, with `interrupted` True. Raises KeyboardInterrupt where nothing is proven by then.
         """
 

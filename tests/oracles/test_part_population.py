@@ -30,10 +30,11 @@ from part_simulator.errors import (
 from part_simulator.part_under_test import MACHINES, PartUnderTest, without_errors
 from part_simulator.questions import QUESTIONS
 from sweeps import long_member, sweep, thinned
+from truepose.cluster.evaluator import Here
 from truepose.workpiece import evaluate
 from truepose.workpiece.evaluate import evaluate_part
 from truepose.workpiece.evaluation import PartEvaluation
-from truepose.workpiece.samples import CHECKED, sampled
+from truepose.workpiece.samples import CHECKED, SampledState, sampled
 from truepose.workpiece.states import BEFORE, PartState, part_states
 
 Floats = NDArray[np.float64]
@@ -219,8 +220,9 @@ def test_first_order_is_off_by_what_it_says(machine: str, tmp_path: Path) -> Non
     def values(points: Floats) -> Floats:
         return np.concatenate(list(under_test.evaluated(points).values()), axis=1)
 
-    linear = sampled(state, values, count, SEED, exact=False)
-    exact = sampled(state, values, count, SEED, exact=True)
+    drawn = SampledState(state, values, SEED)
+    linear = sampled(drawn, count, Here(), exact=False)
+    exact = sampled(drawn, count, Here(), exact=True)
     assert not linear.exact
     assert exact.exact
     off = np.abs(linear.values - exact.values)

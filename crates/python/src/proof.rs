@@ -148,7 +148,7 @@ impl Machine {
         yielding: Vec<(usize, [f64; 2], f64, usize)>,
         wrench: [f64; 6],
         columns: Vec<(usize, usize, f64)>,
-        gap: f64,
+        close: (f64, Option<[f64; 2]>),
         most_boxes: usize,
         earlier: Option<Earlier>,
         progress: &Bound<'py, PyAny>,
@@ -186,7 +186,8 @@ impl Machine {
             yielding,
             wrench,
             deviating: &deviating,
-            gap,
+            gap: close.0,
+            targets: close.1,
             most_boxes,
         };
         let search = match earlier {

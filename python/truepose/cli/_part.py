@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from truepose.cli._cluster import telling
 from truepose.cli._program import Quantities
 from truepose.cli._progress import progress
 from truepose.cli._show import show_lines, show_tables
 from truepose.cli._steps import load_machine, note_written
 from truepose.cli._verbose import say, say_file
+from truepose.cluster.evaluator import evaluator_of
+from truepose.cluster.options import requested_cluster
 from truepose.errors import Problem, RequestError
 from truepose.files.writing import replacing, require_writable, written_together
 from truepose.reporting import part as shown
@@ -46,6 +49,7 @@ def evaluate(machine_file: Path, program: Path, output: Path | None, given: dict
         require_writable(witness, [".toml"], inputs)
         require_writable(witness.with_suffix(".csv"), [".csv"], inputs)
     machine = load_machine(machine_file, given["settings"])
+    cluster = requested_cluster(given["workers"], given["scheduler"], given["tls"])
     asked = _read(machine, program, features, given)
     page = _page() if output is not None and output.suffix.lower() == ".html" else None
     with written_together(), ExitStack() as files:
@@ -57,7 +61,11 @@ def evaluate(machine_file: Path, program: Path, output: Path | None, given: dict
             sinks.append(PointsFile(machine, file))
         if page is not None:
             sinks.append(picture := page.DrawnPath(machine))
-        with progress("part", "samples") as report:
+        with (
+            telling(),
+            evaluator_of(cluster) as evaluator,
+            progress("part", "samples") as report,
+        ):
             evaluation = evaluate_part(
                 machine,
                 asked,
@@ -71,6 +79,7 @@ def evaluate(machine_file: Path, program: Path, output: Path | None, given: dict
                 if given["along"] is None
                 else lambda state: read_along(given["along"], state),
                 sinks=sinks,
+                evaluator=evaluator,
                 progress=report,
             )
         say_file(program)

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from truepose.cli._cluster import cluster_options
 from truepose.cli._machine_test import check_options, test_options
 from truepose.cli._machine_test import run as run_test
 from truepose.cli._options import (
@@ -95,6 +96,7 @@ from truepose.cli._verbose import verbose_option
     ),
     *program_options,
     *test_options,
+    *cluster_options,
     set_option,
     format_option,
     output_option_of(".json, .csv, .nc (NetCDF, SI) or .html"),

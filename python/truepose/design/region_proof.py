@@ -1,8 +1,8 @@
 """Whether a design is proven at every pose of the box, not at some: by interval derivatives.
 
-`truepose.bounds` over the box of the workspace, in each condition, divided until its bound is below
-the targets, or no further. What is only searched is no proof: without this a design is proven at
-poses.
+The bounds of `truepose.bounds` over the box of the workspace, in each condition, divided until they
+are below the targets, or a pose is met with a machine inside the bands that is above one, or no
+further. What is only searched is no proof: without this a design is proven at poses.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from truepose.design.judged_poses import JudgedPoses
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.poses import Progress
-from truepose.uncertainty_analysis.bounds import PROVEN, bounds
+from truepose.runs.poses import Progress, pose_in_words
+from truepose.uncertainty_analysis.bounds import PROVEN
+from truepose.uncertainty_analysis.bounds_over_region import bounds_over_region
+from truepose.uncertainty_analysis.truncation import Ends
 
 _LEAST_GAP = 1e-3
 """The finest that `truepose.bounds` takes."""
@@ -25,17 +27,40 @@ _OF_ROOM = 0.9
 
 
 @dataclass(frozen=True)
+class RegionWitness:
+    """In which `condition` and quantity, and at which pose (n_commanded,), an `error` is reached.
+
+    m and rad.
+    """
+
+    condition: str
+    quantity: str
+    pose: tuple[float, ...]
+    error: float
+
+    def in_words(self, machine: Machine) -> str:
+        """Such as "in hot a machine inside its bands has a position error of 0.2 mm at x = ..."."""
+        size = machine.shown.error(self.quantity).text(self.error, 5)
+        return (
+            f"in {self.condition} a machine inside its bands has a {self.quantity} error of {size} "
+            f"at {pose_in_words(machine, self.pose)}"
+        )
+
+
+@dataclass(frozen=True)
 class RegionProof:
     """Whether the targets are `kept` all over the box, and `why` not, empty where they are.
 
     `bound`: the largest proven by quantity over all conditions, m or rad; infinite of none.
-    `boxes`: parts of the box that were looked at.
+    `boxes`: parts of the box that were looked at. `witness`: where a machine inside the bands was
+    met that is above a target, if one was.
     """
 
     kept: bool
     why: str
     bound: Mapping[str, float]
     boxes: int
+    witness: RegionWitness | None = None
 
 
 def prove_region(
@@ -63,11 +88,19 @@ def prove_region(
     boxes, reached = 0, dict.fromkeys(targets, 0.0)
     for name, condition in conditions.items():
         try:
-            proof = bounds(machine, None, condition, region=region, gap=gap, progress=progress)
+            proof = bounds_over_region(
+                machine, condition, region, gap, Ends.of(None), None, progress, targets
+            )
         except RequestError as refusal:
             problem = refusal.problems[0]
             return RegionProof(False, f"{problem.message} ({problem.found})", bound, boxes)
         boxes += int(proof["boxes"])
+        for kind, target in targets.items():
+            of = proof.sel(quantity=kind)
+            if float(of["reached_magnitude"]) > target:
+                pose, error = of["where_magnitude"].values.tolist(), float(of["reached_magnitude"])
+                met = RegionWitness(name, kind, tuple(pose), error)
+                return RegionProof(False, met.in_words(machine), bound, boxes, met)
         if str(proof["status"].values) != PROVEN:
             why = f"{str(proof['status'].values).replace('_', ' ')} in {name}"
             return RegionProof(False, why, bound, boxes)
@@ -82,4 +115,4 @@ def prove_region(
     return RegionProof(True, "", reached, boxes)
 
 
-__all__ = ["RegionProof", "prove_region"]
+__all__ = ["RegionProof", "RegionWitness", "prove_region"]

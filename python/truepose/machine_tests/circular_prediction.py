@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.cluster.evaluator import Here
 from truepose.machine import Condition, Machine
 from truepose.machine_tests.circle_path import CirclePath, circle_path, out_of_reach
 from truepose.machine_tests.circular_diagnosis import (
@@ -33,7 +34,7 @@ from truepose.uncertainty_analysis.arguments import (
     required_seed,
 )
 from truepose.verdict.states import STATES
-from truepose.workpiece.samples import SampledParts, sampled
+from truepose.workpiece.samples import SampledParts, SampledState, sampled
 from truepose.workpiece.states import part_states
 
 if TYPE_CHECKING:
@@ -147,4 +148,4 @@ def _sampled(
         if progress is not None:
             progress(state * count + done, len(STATES) * count)
 
-    return sampled(seen.state, values, count, seed, account=account)
+    return sampled(SampledState(seen.state, values, seed), count, Here(), account=account)

@@ -36,7 +36,7 @@ from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.bounds_over_region import (
     bounds_over_region,
-    no_proof,
+    require_root,
     required_gap,
 )
 from truepose.uncertainty_analysis.corners import worst_corners
@@ -119,12 +119,7 @@ def bounds(
     cluster = requested_cluster(workers, scheduler, tls)
     given = machine.condition if condition is None else condition
     ends = Ends.of(truncate)
-    if machine.kernel.overconstrained:
-        raise no_proof(
-            machine,
-            "more closures than freedoms",
-            "as many closures as freedoms: there the pose is a root, which can be enclosed",
-        )
+    require_root(machine)
     if region is None:
         if resume is not None:
             raise bad_resume("bounds are asked for at poses", "no region", "the same region")

@@ -98,6 +98,16 @@ def no_proof(machine: Machine, found: str, expected: str, hint: str | None = Non
     )
 
 
+def require_root(machine: Machine) -> None:
+    """Raises `RequestError` (no-proof) where the pose of a machine is no root of its closures."""
+    if machine.kernel.overconstrained:
+        raise no_proof(
+            machine,
+            "more closures than freedoms",
+            "as many closures as freedoms: there the pose is a root, which can be enclosed",
+        )
+
+
 def bounds_over_region(
     machine: Machine,
     condition: Condition,
@@ -106,11 +116,16 @@ def bounds_over_region(
     ends: Ends,
     resume: xr.Dataset | None,
     progress: Progress | None,
+    targets: Mapping[str, float] | None = None,
 ) -> xr.Dataset:
     """Proven bounds over every commanded pose of a region; see `uncertainty_analysis.bounds`.
 
+    With `targets`, sizes in m and rad by quantity, the search is for whether nothing is above them:
+    it ends where that is proven, or where a machine and a pose are met that are.
+
     Raises `RequestError`: bad-region, region-out-of-reach, no-proof, no-source, bad-resume.
     """
+    require_root(machine)
     if not machine.kernel.can_be_enclosed:
         raise no_proof(
             machine,
@@ -147,7 +162,7 @@ def bounds_over_region(
                 strict=True,
             )
         ),
-        gap,
+        (gap, None if targets is None else _sizes(targets)),
         MOST_BOXES,
         goes_on,
         _told(progress),
@@ -177,6 +192,12 @@ def bounds_over_region(
     return result.assign_attrs(
         question | {"gap_reached": float(proof["gap"]), "interrupted": int(proof["interrupted"])}
     )
+
+
+def _sizes(targets: Mapping[str, float]) -> tuple[float, float]:
+    """Of position and orientation; infinite without one."""
+    position, orientation = (targets.get(name, math.inf) for name in ("position", "orientation"))
+    return position, orientation
 
 
 def _middles(variables: Variables) -> list[Affine]:
@@ -330,4 +351,4 @@ def _told(progress: Progress | None) -> Callable[[int, float], bool]:
     return told
 
 
-__all__ = ["SCHEMA", "bounds_over_region", "no_proof", "required_gap"]
+__all__ = ["SCHEMA", "bounds_over_region", "require_root", "required_gap"]

@@ -12,7 +12,7 @@ moved by the tool's radius along the associated line it has the same frame.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -176,27 +176,35 @@ class DatumFrame:
         return datum
 
 
-def datum_alignment(
-    datums: Sequence[Element], *, least_squares: bool
-) -> tuple[DatumFrame, Callable[[Sequence[Floats]], tuple[Floats, Floats]]]:
-    """The frame of a whole part, and what it makes of sampled parts.
+@dataclass(frozen=True, eq=False)
+class PartFrame:
+    """Where sampled parts have their `frame`, in machine coordinates."""
 
-    The function takes (s, n, 3) points of each datum, m, in machine coordinates, and returns
-    rotations R (s, 3, 3) and origins o (s, 3), m: a point x of the machine is at R^T (x - o) of
-    the part, in the program's own coordinates. Raises `FeatureError` where the datums leave the
-    part free in its working plane.
+    frame: DatumFrame
+    coordinates: Coordinates
+
+    def __call__(self, points: Floats) -> tuple[Floats, Floats]:
+        """Rotations R (s, 3, 3) and origins o (s, 3), m, of points (s, n, 3) of all datums, m.
+
+        A point x of the machine is at R^T (x - o) of the part, in the program's own coordinates.
+        """
+        ends = np.cumsum([len(datum) for datum in self.frame.programmed])[:-1]
+        local = [self.coordinates.local(datum) for datum in np.split(points, ends, axis=1)]
+        turned, shift = self.frame.fit(local)
+        axes, middle = self.coordinates.axes, self.coordinates.middle
+        rotation = axes.T @ turned @ axes
+        return rotation, middle - np.einsum("sij,sj->si", rotation, middle - shift @ axes)
+
+
+def datum_alignment(datums: Sequence[Element], *, least_squares: bool) -> PartFrame:
+    """The frame of a whole part.
+
+    Raises `FeatureError` where the datums leave the part free in its working plane.
     """
     coordinates = Coordinates.of(datums)
     frame = DatumFrame(datums, coordinates, least_squares=least_squares)
     frame.require_place(list(np.eye(3)[:2]), "the part")
-
-    def fit(points: Sequence[Floats]) -> tuple[Floats, Floats]:
-        turned, shift = frame.fit([coordinates.local(element) for element in points])
-        axes, middle = coordinates.axes, coordinates.middle
-        rotation = axes.T @ turned @ axes
-        return rotation, middle - np.einsum("sij,sj->si", rotation, middle - shift @ axes)
-
-    return frame, fit
+    return PartFrame(frame, coordinates)
 
 
 def centres(datum: Round, points: Floats) -> Floats:

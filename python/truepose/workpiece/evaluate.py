@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, cast, get_args
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.cluster.evaluator import Here, TaskEvaluator, evaluator_of
+from truepose.cluster.instruction_sets import computing_with
+from truepose.cluster.options import requested_cluster
 from truepose.controllers.gcode.program import ProgramOptions
 from truepose.controllers.gcode.work_offsets import Positions
 from truepose.errors import Problem, RequestError
@@ -54,6 +57,9 @@ def part(
     offsets: Mapping[str, Positions] | None = None,
     parameter_file: str | PathLike[str] | None = None,
     block_delete: bool | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    tls: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """What the machine makes of the part that a program of G-code asks for, against its tolerances.
@@ -65,13 +71,16 @@ def part(
     bands keep the limits, "iso-14253" whether the coverage interval does (ISO 14253-1). `exact`:
     whether samples are solved exactly; by default where first order is not enough. `units`,
     `start`, `offsets`, `parameter_file`, `block_delete` as in `truepose.correct_program`.
-    `progress` is called with (samples done, samples in all).
+    `workers`: so many processes of this computer draw the samples, or those of the dask.distributed
+    `scheduler`, "tcp://host:port" or "tls://host:port" with the folder `tls` (docs/scale.md); the
+    numbers are the same. `progress` is called with (samples done, samples in all).
 
     Returns a Dataset over state ("before compensation", "after compensation") and characteristic,
     SI, described in docs/results.md. Effects of the process (cutter, clamping) are not in it.
 
     Raises `RequestError`: problems of the program (gcode-...) and of the features, no-source,
-    bad-samples, bad-seed, bad-probability, bad-rule; `TrueposeError` as the sources do.
+    bad-samples, bad-seed, bad-probability, bad-rule, bad-workers, no-scheduler, no-worker,
+    worker-lost, extra-missing; `TrueposeError` as the sources do.
     """
     given = ProgramOptions(
         units,
@@ -80,17 +89,21 @@ def part(
         None if parameter_file is None else Path(parameter_file),
         block_delete,
     )
-    evaluation = evaluate_part(
-        machine,
-        read_part(machine, Path(program), None if features is None else Path(features), given),
-        machine.condition if condition is None else condition,
-        samples=required_samples(samples, 2),
-        seed=required_seed(seed),
-        probability=required_probability(probability),
-        rule=_required_rule(rule),
-        exact=exact,
-        progress=progress,
-    )
+    cluster = requested_cluster(workers, scheduler, tls)
+    asked = read_part(machine, Path(program), None if features is None else Path(features), given)
+    with evaluator_of(cluster) as evaluator:
+        evaluation = evaluate_part(
+            machine,
+            asked,
+            machine.condition if condition is None else condition,
+            samples=required_samples(samples, 2),
+            seed=required_seed(seed),
+            probability=required_probability(probability),
+            rule=_required_rule(rule),
+            exact=exact,
+            evaluator=evaluator,
+            progress=progress,
+        )
     from truepose.workpiece.result import dataset
 
     return dataset(evaluation)
@@ -121,57 +134,53 @@ def evaluate_part(
     exact: bool | None = None,
     along: Callable[[PartState], Floats] | None = None,
     sinks: Sequence[Sink] = (),
+    evaluator: TaskEvaluator | None = None,
     progress: Progress | None = None,
 ) -> PartEvaluation:
     """The same before it is a Dataset; `sinks` look at the whole path as it is walked.
 
-    `along`: what every variable of the state as commanded is at every point (n, n_variable), of
-    one machine, which alone is evaluated then.
+    `evaluator`: who draws the samples, by default this process; all is computed on the instruction
+    set that it begins with. `along`: what every variable of the state as commanded is at every
+    point (n, n_variable), of one machine, which alone is evaluated then.
     """
-    sources = required_sources(machine, condition)
-
-    walked = walk(machine, condition, sources, asked.path(), asked.program, sinks)
-    states, status = part_states(machine, condition, sources, walked.poses, walked.travel)
-    lost = np.flatnonzero(status != OK)
-    if lost.size:
-        at = int(lost[0])
-        line, pose = int(walked.lines[at]), walked.poses[at]
-        raise unusable_point(machine, asked.program, line, pose, REASONS[status[at]])
-    if along is not None:
-        states = (fixed(states[0], along(states[0])),)
-    alignment = _alignment(asked, states[0].points)
-    return PartEvaluation(
-        machine,
-        condition,
-        sources,
-        states,
-        asked.features,
-        alignment,
-        walked,
-        asked.units,
-        samples=samples,
-        seed=seed,
-        probability=probability,
-        rule=rule,
-        exact=exact,
-        progress=progress,
-    )
+    drawing = evaluator or Here()
+    with computing_with(drawing.begun_with()):
+        sources = required_sources(machine, condition)
+        walked = walk(machine, condition, sources, asked.path(), asked.program, sinks)
+        states, status = part_states(machine, condition, sources, walked.poses, walked.travel)
+        lost = np.flatnonzero(status != OK)
+        if lost.size:
+            at = int(lost[0])
+            line, pose = int(walked.lines[at]), walked.poses[at]
+            raise unusable_point(machine, asked.program, line, pose, REASONS[status[at]])
+        if along is not None:
+            states = (fixed(states[0], along(states[0])),)
+        return PartEvaluation(
+            machine,
+            condition,
+            sources,
+            states,
+            asked.features,
+            _alignment(asked, states[0].points),
+            walked,
+            asked.units,
+            samples=samples,
+            seed=seed,
+            probability=probability,
+            rule=rule,
+            exact=exact,
+            evaluator=drawing,
+            progress=progress,
+        )
 
 
 def _alignment(asked: Part, points: Floats) -> Alignment:
     """As the part asks for it, of its programmed `points` (n, 3)."""
     if asked.alignment != "datums":
         return Alignment(asked.alignment, points, np.arange(len(points)))
-    frame, fit = datum_alignment(asked.datums, least_squares=False)
-    ends = np.cumsum([datum.place.size for datum in asked.datums])[:-1]
+    frame = datum_alignment(asked.datums, least_squares=False)
     members = np.concatenate([datum.place for datum in asked.datums])
-    return Alignment(
-        "datums",
-        points,
-        members,
-        lambda moved: fit(np.split(moved, ends, axis=1)),
-        FrameMotion.of(frame),
-    )
+    return Alignment("datums", points, members, frame, FrameMotion.of(frame.frame))
 
 
 __all__ = ["SAMPLES", "evaluate_part", "part"]

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
+from truepose.cluster.evaluator import TaskEvaluator
 from truepose.files.units import FileUnit
 from truepose.machine import Condition, Machine
 from truepose.runs.displacement import displacement
@@ -20,8 +21,9 @@ from truepose.verdict.states import BEFORE
 from truepose.workpiece.alignment import Alignment
 from truepose.workpiece.along import Walked
 from truepose.workpiece.features import Feature, Forms, Quantity
-from truepose.workpiece.reached import FeatureSearch, FeatureValues, Search
-from truepose.workpiece.samples import SampledParts, sampled
+from truepose.workpiece.part_values import PartValues, places
+from truepose.workpiece.reached import FeatureSearch, Search
+from truepose.workpiece.samples import SampledParts, SampledState, sampled
 from truepose.workpiece.states import PartState, in_space
 from truepose.workpiece.worst import Interval, PointBounds, from_above
 
@@ -115,6 +117,7 @@ class PartEvaluation:
     """The part of one program on one machine.
 
     `units`, by dimension, and `shown`: in what it is told, as the drawing has it, else the machine.
+    `evaluator`: who draws the samples.
     """
 
     def __init__(
@@ -133,12 +136,13 @@ class PartEvaluation:
         probability: float,
         rule: Rule,
         exact: bool | None,
+        evaluator: TaskEvaluator,
         progress: Progress | None,
     ) -> None:
         self.machine, self.condition, self.sources = machine, condition, tuple(sources)
         self.features, self.alignment, self.walked = tuple(features), alignment, walked
         self.samples, self.seed, self.probability, self.rule = samples, seed, probability, rule
-        self._exact, self._progress = exact, progress
+        self._exact, self._progress, self._evaluator = exact, progress, evaluator
         self.units = {**machine.file_units, **units}
         self.shown = machine.shown.declaring(units)
         self._done = 0
@@ -147,25 +151,9 @@ class PartEvaluation:
             for feature in self.features
             for number in range(len(feature.quantities))
         )
-        self._values = [
-            FeatureValues(feature, places(feature), alignment, feature.forms())
-            for feature in self.features
-        ]
-        self.states = tuple(self._answered(state) for state in states)
-
-    def values(self, points: Floats) -> Floats:
+        self.values = PartValues(self.features, alignment)
         """(s, c) of all characteristics of parts whose points are (s, n, 3)."""
-        moved = any(values.moved for values in self._values)
-        aligned = self.alignment.apply(points) if moved else points
-        return np.concatenate(
-            [
-                feature.values(
-                    [(aligned if values.moved else points)[:, place] for place in places(feature)]
-                )
-                for feature, values in zip(self.features, self._values, strict=True)
-            ],
-            axis=1,
-        )
+        self.states = tuple(self._answered(state) for state in states)
 
     @property
     def of_bands(self) -> bool:
@@ -183,7 +171,13 @@ class PartEvaluation:
             self._progress(self._done + done, 2 * self.samples)
 
     def _answered(self, state: PartState) -> StateAnswers:
-        drawn = sampled(state, self.values, self.samples, self.seed, self._exact, self._account)
+        drawn = sampled(
+            SampledState(state, self.values, self.seed),
+            self.samples,
+            self._evaluator,
+            self._exact,
+            self._account,
+        )
         self._done += self.samples
         bounds = PointBounds(state)
         programmed = self.values(state.points[np.newaxis])[0]
@@ -327,8 +321,3 @@ def _farthest(values: Floats) -> list[int]:
     lost = ~np.isfinite(values)
     least = np.where(lost, np.inf, values).argmin(axis=0)
     return [*least.tolist(), *np.where(lost, -np.inf, values).argmax(axis=0).tolist()]
-
-
-def places(feature: Feature) -> tuple[Indices, ...]:
-    """Points of the part, of each element and then each datum of a feature."""
-    return tuple(element.place for element in [*feature.elements, *feature.datums])

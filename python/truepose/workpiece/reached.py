@@ -8,7 +8,6 @@ exactly. How many machines were tried is counted.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.workpiece.alignment import Alignment
 from truepose.workpiece.features import Feature, Forms
+from truepose.workpiece.part_values import FeatureValues
 from truepose.workpiece.states import PartState, every_point
 from truepose.workpiece.varying import Varying
 from truepose.workpiece.worst import in_part
@@ -195,34 +195,3 @@ class FeatureSearch:
                 break
             best, reached = further, value
         return best
-
-
-class FeatureValues:
-    """The quantities of a feature, of parts that are first aligned where that changes them.
-
-    Called with parts (s, m, 3) at `points` (m,) of the part: the feature's own, or all where the
-    alignment moves them.
-    """
-
-    def __init__(
-        self,
-        feature: Feature,
-        parts: Sequence[Indices],
-        alignment: Alignment,
-        forms: Sequence[Forms],
-    ) -> None:
-        members = np.concatenate(list(parts))
-        self._feature, self._alignment = feature, alignment
-        self.moved = any(
-            in_part(alignment, one, members)[2] for of in forms for one in (of, *of.plus)
-        )
-        self.points: Indices = np.arange(len(alignment.nominal)) if self.moved else members
-        ends = np.cumsum([0, *(part.size for part in parts)]).tolist()
-        own = [np.arange(low, high) for low, high in itertools.pairwise(ends)]
-        self._parts = list(parts) if self.moved else own
-
-    def __call__(self, points: Floats) -> Floats:
-        """(s, n_quantity)."""
-        aligned = self._alignment.apply(points) if self.moved else points
-        quantities: Floats = self._feature.values([aligned[:, place] for place in self._parts])
-        return quantities

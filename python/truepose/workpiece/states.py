@@ -8,6 +8,7 @@ about the known shifts, `value + effects t`; both are told apart.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -40,6 +41,10 @@ class PartState:
     machine: Machine
     block: PoseBlock
     variables: Variables
+
+    def alone(self) -> PartState:
+        """The same without what is computed from it: what is sent elsewhere is small."""
+        return dataclasses.replace(self, block=self.block.alone())
 
     @cached_property
     def points(self) -> Floats:

@@ -1,4 +1,4 @@
-"""Budgets, samples and bounds on a cluster: the bits of one process, whoever comes or goes.
+"""Budgets, samples, bounds and parts on a cluster: the bits of one process, whoever comes or goes.
 
 As in `test_study`, nothing of dask.distributed runs in the process of the tests.
 """
@@ -23,6 +23,8 @@ from machine_texts import with_workspace
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.timeout(600)
 
+POCKET = MACHINES.parent / "examples" / "part"
+PART = (str(POCKET / "pocket.ngc"), "--features", str(POCKET / "pocket.toml"))
 PLANAR, HEXAPOD = MACHINES / "planar_two_slider.toml", MACHINES / "hexapod.toml"
 
 COMMANDS: dict[str, tuple[str, ...]] = {
@@ -31,7 +33,12 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "as many samples as it takes": ("montecarlo", str(PLANAR), "--digits", "1"),
     "sobol": ("montecarlo", str(PLANAR), "--samples", "256", "--sampling", "sobol"),
     "bounds": ("bounds", str(PLANAR)),
+    "part": ("part", str(HEXAPOD), *PART, "--samples", "600"),
+    "exact part": ("part", str(HEXAPOD), *PART, "--samples", "300", "--exact"),
 }
+
+NOT_MET = ("part", "exact part")
+"""Commands whose exit code is 1: a quantity is NOT met."""
 
 OLDER = """
 from truepose.cluster import in_worker
@@ -99,8 +106,8 @@ def words(*of_command: str) -> list[str]:
     return [sys.executable, "-m", "truepose", *of_command, "--format", "json"]
 
 
-def told(*of_command: str) -> str:
-    """What a command prints."""
+def told(*of_command: str, code: int = 0) -> str:
+    """What a command prints that ends with an exit code."""
     done = subprocess.run(
         words(*of_command),
         env=ENVIRONMENT,
@@ -109,7 +116,7 @@ def told(*of_command: str) -> str:
         timeout=LIMIT,
         check=False,
     )
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    assert (done.returncode, done.stderr) == (code, ""), done.stderr
     return done.stdout
 
 
@@ -132,7 +139,9 @@ def test_workers_give_the_bits_of_one_process(name: str, fine: Path, cluster: Cl
     command = tuple(str(fine) if word == "FINE" else word for word in COMMANDS[name])
     cluster.worker("one")
     cluster.worker("two")
-    assert told(*command, "--scheduler", cluster.address) == told(*command)
+    code = 1 if name in NOT_MET else 0
+    here = told(*command, code=code)
+    assert told(*command, "--scheduler", cluster.address, code=code) == here
 
 
 def test_workers_of_this_computer_do_as_well(fine: Path) -> None:

@@ -25,15 +25,9 @@ def of_datums(*, least_squares: bool) -> Alignment:
         wall("B", (-0.05, -0.03, 0.01), (-0.05, 0.05, 0.01), 20),
     ]
     nominal = np.concatenate([one.points for one in datums])
-    ends = np.cumsum([len(one.points) for one in datums])[:-1]
-    frame, fit = datum_alignment(datums, least_squares=least_squares)
-    return Alignment(
-        "datums",
-        nominal,
-        np.arange(len(nominal)),
-        lambda points: fit(np.split(points, ends, axis=1)),
-        FrameMotion.of(frame),
-    )
+    frame = datum_alignment(datums, least_squares=least_squares)
+    motion = FrameMotion.of(frame.frame)
+    return Alignment("datums", nominal, np.arange(len(nominal)), frame, motion)
 
 
 ALIGNMENTS = {

@@ -41,21 +41,23 @@ def _points(datums: list[Element]) -> list[Floats]:
 def test_the_frame_goes_with_the_part(name: str, least_squares: bool) -> None:
     """Whatever errors the datums have: a part turned by R and moved has a frame that is, too."""
     datums = FRAMES[name]
-    frame, fit = datum_alignment(datums, least_squares=least_squares)
+    fit = datum_alignment(datums, least_squares=least_squares)
     rng = np.random.default_rng(1)
-    off = [points + 1e-5 * rng.standard_normal(points.shape) for points in _points(datums)]
-    turn = [2e-3, -1e-3, 3e-3] if frame.tilts else [0.0, 0.0, 3e-3]
+    points = np.concatenate(_points(datums), axis=1)
+    off = points + 1e-5 * rng.standard_normal(points.shape)
+    turn = [2e-3, -1e-3, 3e-3] if fit.frame.tilts else [0.0, 0.0, 3e-3]
     matrix = scipy.spatial.transform.Rotation.from_rotvec(turn).as_matrix()
-    shift = np.array([0.02, -0.01, 0.005 if frame.tilts else 0.0])
+    shift = np.array([0.02, -0.01, 0.005 if fit.frame.tilts else 0.0])
     rotation, origin = fit(off)
-    after, origin_after = fit([points @ matrix.T + shift for points in off])
+    after, origin_after = fit(off @ matrix.T + shift)
     np.testing.assert_allclose(after[0], matrix @ rotation[0], rtol=0, atol=1e-13)
     np.testing.assert_allclose(origin_after[0], matrix @ origin[0] + shift, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", FRAMES)
 def test_a_perfect_part_is_where_it_is_drawn(name: str) -> None:
-    rotation, origin = datum_alignment(FRAMES[name], least_squares=False)[1](_points(FRAMES[name]))
+    points = np.concatenate(_points(FRAMES[name]), axis=1)
+    rotation, origin = datum_alignment(FRAMES[name], least_squares=False)(points)
     np.testing.assert_allclose(rotation[0], np.eye(3), rtol=0, atol=1e-14)
     np.testing.assert_allclose(origin[0], 0.0, rtol=0, atol=1e-15)
 
@@ -83,10 +85,10 @@ def test_the_motion_is_the_derivative_of_least_squares(name: str) -> None:
 def test_the_first_datum_turns_and_the_second_stops() -> None:
     """B leans: the part turns with A alone, and ends at the middle of B's zone."""
     lean = 1e-3
-    _, fit = datum_alignment([BOTTOM, LEFT], least_squares=False)
+    fit = datum_alignment([BOTTOM, LEFT], least_squares=False)
     first, second = _points([BOTTOM, LEFT])
     leaning = second + lean * second[..., 1:2] * [1.0, 0.0, 0.0]
-    (rotation,), (origin,) = fit([first, leaning])
+    (rotation,), (origin,) = fit(np.concatenate([first, leaning], axis=1))
     np.testing.assert_allclose(rotation, np.eye(3), rtol=0, atol=1e-14)
     np.testing.assert_allclose(origin, [0.5 * lean * 0.06, 0.0, 0.0], rtol=0, atol=1e-14)
 

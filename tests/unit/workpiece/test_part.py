@@ -7,8 +7,10 @@ import dataclasses
 import functools
 import io
 import json
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,13 +18,15 @@ import pytest
 import truepose as tp
 from command_line import MACHINES, PLANAR, Outcome, call
 from sweeps import sweep
+from truepose._kernel import instruction_set
+from truepose.cluster.evaluator import Here
 from truepose.machine import Machine
 from truepose.verdict.states import AFTER, BEFORE
 from truepose.workpiece.evaluate import evaluate_part
 from truepose.workpiece.evaluation import MET, NOT_MET, UNDECIDED, PartEvaluation
 from truepose.workpiece.read import read_part
 from truepose.workpiece.result import dataset as dataset_of
-from truepose.workpiece.samples import sampled
+from truepose.workpiece.samples import SampledState, sampled
 from truepose.workpiece.worst import from_above
 
 PROGRAM = """\
@@ -207,19 +211,49 @@ def test_samples_are_those_of_monte_carlo(shared: Shared) -> None:
 def test_chunks_make_no_difference(shared: Shared, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many samples are worked on at a time."""
     evaluation = shared(*ALONG)
-    state, values = evaluation.states[0].state, evaluation.values
-    whole = sampled(state, values, 60, 1, exact=False)
-    monkeypatch.setattr("truepose.workpiece.samples.NUMBERS", 7 * state.points.size)
-    pieces = sampled(state, values, 60, 1, exact=False)
+    drawn = SampledState(evaluation.states[0].state, evaluation.values, 1)
+    whole = sampled(drawn, 60, Here(), exact=False)
+    monkeypatch.setattr("truepose.workpiece.samples.NUMBERS", 7 * drawn.state.points.size)
+    pieces = sampled(drawn, 60, Here(), exact=False)
     assert np.abs(whole.values - pieces.values).max() < 1e-15
+
+
+@pytest.mark.parametrize("alignment", ["clamped", "best-fit", "datums"])
+@pytest.mark.parametrize("exact", [True, False])
+def test_samples_that_others_draw_are_the_same(
+    files: tuple[Path, Path], alignment: str, exact: bool
+) -> None:
+    """In whatever order the ranges of samples come, and of a state that was pickled."""
+
+    class Elsewhere:
+        """Tasks are pickled, and come the last first."""
+
+        def begun_with(self) -> str:
+            return instruction_set()
+
+        def results(self, function: Any, shared: Any, tasks: Iterator[tuple[int, Any]]) -> Any:
+            function, shared = pickle.loads(pickle.dumps((function, shared)))  # noqa: S301
+            return [(number, function(shared, own)) for number, own in reversed(list(tasks))]
+
+    text = f'[part]\nalignment = "{alignment}"\n'
+    text += 'datums = ["A", "B"]\n' if alignment == "datums" else ""
+    second = '[[datum]]\nname = "B"\nlines = "5"\n'
+    files[1].write_text(f"{text}{FEATURES}{second}", encoding="utf-8")
+    evaluation = evaluated(tp.load(PLANAR, settings=list(ALONG)), files, samples=2, exact=False)
+    for answers in evaluation.states:
+        drawn = SampledState(answers.state, evaluation.values, 5)
+        here = sampled(drawn, 700, Here(), exact=exact)
+        there = sampled(drawn, 700, Elsewhere(), exact=exact)
+        np.testing.assert_array_equal(here.values, there.values)
+        assert (here.failed, here.exact) == (there.failed, there.exact)
 
 
 def test_first_order_is_told_from_exact(shared: Shared) -> None:
     """They differ by no more than is said of the samples that were solved both ways."""
     evaluation = shared()
-    state, values = evaluation.states[0].state, evaluation.values
-    linear = sampled(state, values, 100, 0, exact=False)
-    exact = sampled(state, values, 100, 0, exact=True)
+    drawn = SampledState(evaluation.states[0].state, evaluation.values, 0)
+    linear = sampled(drawn, 100, Here(), exact=False)
+    exact = sampled(drawn, 100, Here(), exact=True)
     assert exact.exact
     assert not linear.exact
     off = np.abs(linear.values - exact.values).max(axis=0)

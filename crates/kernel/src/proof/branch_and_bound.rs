@@ -1,5 +1,13 @@
 //! Bounds of the error over a region of commanded poses, by branch and bound: the part of the region with
 //! the highest bound is halved until no bound lies above an error reached somewhere by more than the gap.
+//!
+//! Where sizes have targets the question is whether all is below them: the search ends where that is so, or
+//! where an error above one is met, and no bound need be closer.
+//!
+//! What is reached is looked for in the middle of every part, and at the corners of the region first, where
+//! errors are largest as a rule. A part is halved along the freedom in which it is the most steps long. A step
+//! is the length along that freedom alone, about the middle of the region, over which the bound lies above
+//! what is reached by the gap.
 
 use super::Unproven;
 use super::over_region::{Look, middle_of};
@@ -75,9 +83,9 @@ impl Part {
         extended.map(|k| self.share(region, k)).product()
     }
 
-    /// Halved along its widest side, relative to the region's.
-    fn halves(&self, region: &Region<'_>) -> [Part; 2] {
-        let share = |&k: &usize| self.share(region, k);
+    /// Halved along the side that is longest in `steps` (shares of the region's sides).
+    fn halves(&self, region: &Region<'_>, steps: &[f64]) -> [Part; 2] {
+        let share = |&k: &usize| self.share(region, k) / steps[k];
         let widest =
             (0..self.sides.len()).max_by(|a, b| share(a).total_cmp(&share(b))).unwrap_or(0);
         let middle = middle_of(&self.sides)[widest];
@@ -118,17 +126,27 @@ impl Search {
     }
 
     /// The highest bounds that close the targets; as low as can be before all are reached.
-    fn allowed(&self, gap: f64) -> [f64; TARGETS] {
-        if self.reached.contains(&f64::NEG_INFINITY) {
+    fn allowed(&self, region: &Region<'_>) -> [f64; TARGETS] {
+        if let Some(sizes) = region.targets {
+            let mut allowed = [f64::INFINITY; TARGETS];
+            allowed[2 * SIX..].copy_from_slice(&sizes);
+            allowed
+        } else if self.reached.contains(&f64::NEG_INFINITY) {
             AS_LOW_AS_CAN_BE
         } else {
-            allowed_bounds(&self.reached, gap)
+            allowed_bounds(&self.reached, region.gap)
         }
+    }
+
+    /// Whether an error above a target was met.
+    fn is_refuted(&self, region: &Region<'_>) -> bool {
+        let sizes = self.reached[2 * SIX..].iter();
+        region.targets.is_some_and(|targets| sizes.zip(targets).any(|(&size, most)| size > most))
     }
 
     /// Look at the parts that are fresh, side by side; a pose that the machine cannot be commanded to.
     fn look(&mut self, region: &Region<'_>) -> Result<(), (Status, Vec<f64>)> {
-        let allowed = self.allowed(region.gap);
+        let allowed = self.allowed(region);
         let fresh = self.parts.iter_mut().filter(|part| matches!(part.state, State::Fresh));
         let mut looks: Vec<(&mut Part, Option<Look>)> = fresh.map(|part| (part, None)).collect();
         let count = looks.len();
@@ -145,20 +163,43 @@ impl Search {
                 return Err((look.status, middle));
             }
             part.take(look.bound);
-            for target in 0..TARGETS {
-                if look.reached[target] > self.reached[target] {
-                    self.reached[target] = look.reached[target];
-                    self.at[target].clone_from(&middle);
-                }
-            }
+            note((&mut self.reached, &mut self.at), &look.reached, &middle);
         }
         Ok(())
     }
 
+    /// What is reached at the corners of the region, where it is more than one pose.
+    fn look_at_corners(&mut self, region: &Region<'_>) {
+        if region.sides.iter().all(|[low, high]| low == high) {
+            return;
+        }
+        let mut corners = vec![Vec::new()];
+        for &[low, high] in &region.sides {
+            let ends = if high > low { vec![low, high] } else { vec![low] };
+            let further = corners.iter().flat_map(|corner: &Vec<f64>| {
+                ends.iter().map(|&end| [corner.as_slice(), &[end]].concat())
+            });
+            corners = further.collect();
+        }
+        let mut looks: Vec<(Vec<f64>, Option<Look>)> =
+            corners.into_iter().map(|corner| (corner, None)).collect();
+        let count = looks.len();
+        share_out(&mut looks, count, 1, |_, looks| {
+            for (corner, look) in looks {
+                *look = Some(region.look_at(corner));
+            }
+        });
+        for (corner, look) in looks {
+            if let Some(look) = look {
+                note((&mut self.reached, &mut self.at), &look.reached, &corner);
+            }
+        }
+    }
+
     /// Finish the parts that cannot rise above the allowed bounds, and bring the others into order, the
     /// highest bound first.
-    fn finish(&mut self, gap: f64) {
-        let allowed = self.allowed(gap);
+    fn finish(&mut self, region: &Region<'_>) {
+        let allowed = self.allowed(region);
         let mut rest: Vec<(f64, Part)> = Vec::with_capacity(self.parts.len());
         for part in std::mem::take(&mut self.parts) {
             match part.bound {
@@ -206,6 +247,10 @@ pub fn bound_over_region(
 ) -> RegionBound {
     let most_boxes = search.boxes + region.most_boxes;
     let none = [f64::INFINITY; TARGETS];
+    let steps = region.steps();
+    if search.boxes == 0 {
+        search.look_at_corners(region);
+    }
     loop {
         if let Err(place) = search.look(region) {
             let out_of_reach = Some(place);
@@ -217,9 +262,10 @@ pub fn bound_over_region(
                 search,
             };
         }
-        search.finish(region.gap);
+        search.finish(region);
         let stop = search.parts.first().is_none_or(|first| first.widest(region) < SMALLEST)
             || search.boxes >= most_boxes
+            || search.is_refuted(region)
             || !progress(search.boxes, search.finished_share(region));
         let given_up = search
             .parts
@@ -244,19 +290,86 @@ pub fn bound_over_region(
             for part in &search.parts {
                 raise(&mut bound, &part.bound.unwrap_or(none));
             }
-            let gap = gap_of(&bound, &search.reached);
+            let gap = region.gap_of(&bound, &search.reached);
             return RegionBound { bound, gap, unproven: None, out_of_reach: None, search };
         }
         let halved =
             search.parts.len().min(BATCH.max(search.parts.len() / BATCH).min(LARGEST_BATCH));
         let rest = search.parts.split_off(halved);
-        let halves: Vec<[Part; 2]> = search.parts.iter().map(|part| part.halves(region)).collect();
+        let halves: Vec<[Part; 2]> =
+            search.parts.iter().map(|part| part.halves(region, &steps)).collect();
         // The two halves of a part take as long, and are looked at by different threads.
         let (lower, upper): (Vec<Part>, Vec<Part>) =
             halves.into_iter().map(<(Part, Part)>::from).unzip();
         search.parts = lower;
         search.parts.extend(upper);
         search.parts.extend(rest);
+    }
+}
+
+impl Region<'_> {
+    /// A pose of the region.
+    fn look_at(&self, pose: &[f64]) -> Look {
+        let spot: Vec<[f64; 2]> = pose.iter().map(|&value| [value, value]).collect();
+        self.look(&spot, &AS_LOW_AS_CAN_BE)
+    }
+
+    /// What the highest of the gaps is, of the sizes alone where these have targets.
+    fn gap_of(&self, bound: &[f64; TARGETS], reached: &[f64; TARGETS]) -> f64 {
+        let unit = allowed_bounds(reached, 1.0);
+        let first = if self.targets.is_some() { 2 * SIX } else { 0 };
+        (first..TARGETS)
+            .filter(|&target| unit[target] > reached[target])
+            .map(|target| (bound[target] - reached[target]) / (unit[target] - reached[target]))
+            .fold(0.0, f64::max)
+    }
+
+    /// How long a part may be along each commanded freedom alone, as a share of the region, for its bound to
+    /// lie above what is reached by about the gap.
+    fn steps(&self) -> Vec<f64> {
+        let middle = middle_of(&self.sides);
+        let own: Vec<[f64; 2]> = middle.iter().map(|&value| [value, value]).collect();
+        let looks = (0..self.sides.len()).map(|k| {
+            let [low, high] = self.sides[k];
+            let mut step = 1.0;
+            let mut wider: Option<f64> = None;
+            while high > low && step > SMALLEST {
+                let mut sides = own.clone();
+                let half = 0.5 * step * (high - low);
+                sides[k] = [middle[k] - half, middle[k] + half];
+                let Look { bound, mut reached, .. } = self.look(&sides, &AS_LOW_AS_CAN_BE);
+                for end in sides[k] {
+                    let mut pose = middle.clone();
+                    pose[k] = end;
+                    for (reached, there) in reached.iter_mut().zip(self.look_at(&pose).reached) {
+                        *reached = reached.max(there);
+                    }
+                }
+                let gap = bound.map_or(f64::INFINITY, |bound| self.gap_of(&bound, &reached));
+                if gap <= self.gap {
+                    // Between this and the one of twice the length.
+                    return wider.map_or(step, |wider| step * wider);
+                }
+                wider = Some((2.0 * (self.gap / gap).sqrt()).max(1.0));
+                step *= 0.5;
+            }
+            step
+        });
+        looks.collect()
+    }
+}
+
+/// What is reached at a pose, and what was known of that.
+fn note(
+    (reached, at): (&mut [f64; TARGETS], &mut [Vec<f64>]),
+    found: &[f64; TARGETS],
+    pose: &[f64],
+) {
+    for target in 0..TARGETS {
+        if found[target] > reached[target] {
+            reached[target] = found[target];
+            at[target] = pose.to_vec();
+        }
     }
 }
 
@@ -279,18 +392,10 @@ fn allowed_bounds(reached: &[f64; TARGETS], gap: f64) -> [f64; TARGETS] {
     allowed
 }
 
-/// What the highest of the targets' gaps is.
-fn gap_of(bound: &[f64; TARGETS], reached: &[f64; TARGETS]) -> f64 {
-    let unit = allowed_bounds(reached, 1.0);
-    (0..TARGETS)
-        .filter(|&target| unit[target] > reached[target])
-        .map(|target| (bound[target] - reached[target]) / (unit[target] - reached[target]))
-        .fold(0.0, f64::max)
-}
-
 /// By how much the worst target lies above its allowed bound, relative to that.
 fn relative_excess(bound: &[f64; TARGETS], allowed: &[f64; TARGETS]) -> f64 {
     (0..TARGETS)
+        .filter(|&target| allowed[target] < f64::INFINITY)
         .map(|target| {
             let scale = allowed[target].abs().max(f64::MIN_POSITIVE);
             (bound[target] - allowed[target]) / scale

@@ -6,14 +6,14 @@
 use super::at_pose::{Extent, along, displacement_numbers};
 use super::pose_box::Over;
 use super::region::Region;
-use super::targets::{Closeness, TARGETS, targets};
+use super::targets::{Bounds, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
 use crate::batch::displacement;
 use crate::kinematics::{Inverse, Sample, commanded_pose, forward, inverse, limbs};
 use crate::linear::SIX;
 use crate::machine::{Machine, indices_of};
 use crate::scalar::Interval;
-use crate::spatial::Pose;
+use crate::spatial::{Pose, Vector};
 use crate::status::Status;
 use std::cell::Cell;
 
@@ -21,6 +21,8 @@ use std::cell::Cell;
 const FEW: usize = 3;
 /// Magnitudes are refined until they lie at most this above the farthest reach.
 const FINE: f64 = 1.005;
+/// Times that a machine is taken that is worst along the way that the last one went.
+const CLIMBED: usize = 2;
 
 /// What a look at a box finds.
 pub(super) struct Look {
@@ -78,23 +80,23 @@ impl Region<'_> {
         let over = self.over(&command)?;
         let spot_command = self.command(&spot, &solved.pose, &solved.joints)?;
         let own = self.over(&spot_command)?;
-        let reached = self.reached(&own, &solved.joints, &solved.pose);
         let forms = self.forms::<M>(&spot_command, &command, (sides, &halves), &solved.pose)?;
         let first = self.first_order(&forms, &over)?;
         let bounds = |most: &dyn Fn(&[f64; SIX]) -> f64| {
             let closeness = Closeness { fine: FINE, enough: *allowed };
-            targets(machine, &over.whole, &closeness, most).values
+            targets(machine, &over.whole, &closeness, most)
         };
         let closed = |bound: &[f64; TARGETS]| bound.iter().zip(allowed).all(|(a, b)| a <= b);
         let reach = |u: &[f64; SIX]| {
             let [linear, beyond] = first.reach(u);
             (point(linear) + point(beyond)).upper
         };
-        let mut bound = bounds(&reach);
+        let Bounds { values: mut bound, farthest } = bounds(&reach);
+        let reached = self.reached(&own, &solved.joints, &solved.pose, &farthest);
         // One machine at a time where nothing is allowed yet, or where it is only what is beyond the
         // first order that is too much.
         let nothing_yet = allowed.contains(&f64::NEG_INFINITY);
-        if nothing_yet || (!closed(&bound) && closed(&bounds(&|u| first.reach(u)[0]))) {
+        if nothing_yet || (!closed(&bound) && closed(&bounds(&|u| first.reach(u)[0]).values)) {
             let at_middle = Extent {
                 machine,
                 joints: &solved.joints,
@@ -117,7 +119,7 @@ impl Region<'_> {
                     in_vain.set(!nothing_yet && finer > enough);
                     finer
                 });
-                for (bound, finer) in bound.iter_mut().zip(finer) {
+                for (bound, finer) in bound.iter_mut().zip(finer.values) {
                     *bound = bound.min(finer);
                 }
             }
@@ -125,8 +127,15 @@ impl Region<'_> {
         Ok((bound, reached))
     }
 
-    /// The exact error at the vertices that are worst to first order.
-    fn reached(&self, over: &Over, joints: &[f64], pose: &Pose<f64>) -> [f64; TARGETS] {
+    /// The exact error at the vertices that are worst to first order along axes and `directions` of
+    /// position and orientation, and from the farthest of them on.
+    fn reached(
+        &self,
+        over: &Over,
+        joints: &[f64],
+        pose: &Pose<f64>,
+        directions: &[Vector<f64>; 2],
+    ) -> [f64; TARGETS] {
         let machine = self.machine;
         let mut best = [f64::NEG_INFINITY; TARGETS];
         let mut try_vertex = |direction: &[f64; SIX]| -> Option<[f64; SIX]> {
@@ -163,24 +172,33 @@ impl Region<'_> {
         };
         let free = indices_of(&machine.dof);
         for part in 0..2 {
-            let mut farthest: Option<[f64; SIX]> = None;
-            let size = |one: &[f64; SIX]| (0..3).map(|k| one[3 * part + k].powi(2)).sum::<f64>();
+            let own = 3 * part..3 * part + 3;
+            let towards = |vector: &[f64]| {
+                let mut direction = [0.0; SIX];
+                direction[own.clone()].copy_from_slice(vector);
+                direction
+            };
+            let size = |one: &[f64; SIX]| one[own.clone()].iter().map(|k| k * k).sum::<f64>();
+            let mut farthest = [0.0; SIX];
             for &k in free.iter().filter(|&&k| k / 3 == part) {
                 for sign in [1.0, -1.0] {
                     let mut direction = [0.0; SIX];
                     direction[k] = sign;
                     if let Some(vertex) = try_vertex(&direction)
-                        && farthest.is_none_or(|best| size(&vertex) > size(&best))
+                        && size(&vertex) > size(&farthest)
                     {
-                        farthest = Some(vertex);
+                        farthest = vertex;
                     }
                 }
             }
-            for _ in 0..2 {
-                let Some(vertex) = farthest else { break };
-                let mut direction = [0.0; SIX];
-                direction[3 * part..3 * part + 3].copy_from_slice(&vertex[3 * part..3 * part + 3]);
-                farthest = try_vertex(&direction);
+            for mut direction in [towards(&farthest[own.clone()]), towards(&directions[part])] {
+                for _ in 0..CLIMBED {
+                    if size(&direction) == 0.0 {
+                        break;
+                    }
+                    let Some(vertex) = try_vertex(&direction) else { break };
+                    direction = towards(&vertex[own.clone()]);
+                }
             }
         }
         best

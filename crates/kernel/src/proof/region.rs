@@ -22,6 +22,9 @@ pub struct Region<'a> {
     pub deviating: &'a Deviating,
     /// How far the bounds may lie above the errors reached, relative.
     pub gap: f64,
+    /// Sizes of position (m) and orientation (rad) that nothing may be above: where they are given, the
+    /// question is whether it is so, and no bound need be lower.
+    pub targets: Option<[f64; 2]>,
     /// Boxes that may be looked at.
     pub most_boxes: usize,
 }

@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -169,12 +170,22 @@ def _here(count: int) -> dict[str, float]:
     seconds = time.perf_counter() - begun
     if found.attrs["poses_used"] != count**2:
         raise RuntimeError("some poses are left out")
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    own, children = (
-        resource.getrusage(who).ru_maxrss / unit
-        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    )
-    return {"mib": own, "workers": children, "seconds": seconds}
+    children = _peak(resource.RUSAGE_CHILDREN)
+    return {"mib": _own_peak(), "workers": children, "seconds": seconds}
+
+
+def _peak(who: int) -> float:
+    """MiB at most, by the system's accounts."""
+    return resource.getrusage(who).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+
+
+def _own_peak() -> float:
+    """MiB that this process took at most. On Linux its account begins with what began it."""
+    status = Path("/proc/self/status")
+    if not status.exists():
+        return _peak(resource.RUSAGE_SELF)
+    (line,) = (line for line in status.read_text().splitlines() if line.startswith("VmHWM:"))
+    return float(line.split()[1]) / 2**10
 
 
 def _cost(pose: float) -> list[Row]:

@@ -95,6 +95,19 @@ if __name__ == "__main__":
 """
 
 
+KEPT = """
+import os
+from truepose.cluster.options import ClusterOptions
+from truepose.cluster.workers import connected
+
+if __name__ == "__main__":
+    with connected(ClusterOptions(1)) as workers:
+        workers.wait_for_one()
+        names = "MALLOC_TRIM_THRESHOLD_", "OPENBLAS_NUM_THREADS", "TRUEPOSE_THREADS"
+        print([list(workers.client.run(os.environ.get, name).values()) for name in names])
+"""
+
+
 @pytest.fixture
 def fine(tmp_path: Path) -> Path:
     """The planar machine with 120,000 poses: 15 blocks."""
@@ -157,6 +170,16 @@ def test_a_second_cluster_in_one_process(fine: Path, tmp_path: Path) -> None:
         env=ENVIRONMENT, capture_output=True, text=True, timeout=LIMIT, check=False,
     )  # fmt: skip
     assert done.stdout == "twice\n", done.stderr
+
+
+def test_workers_have_one_thread_and_keep_the_memory_of_arrays(tmp_path: Path) -> None:
+    script = tmp_path / "kept.py"
+    script.write_text(KEPT)
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        env=ENVIRONMENT, capture_output=True, text=True, timeout=LIMIT, check=False,
+    )  # fmt: skip
+    assert done.stdout == "[[None], ['1'], ['1']]\n", done.stderr
 
 
 def test_a_worker_that_is_refused_is_named_in_python(

@@ -149,7 +149,8 @@ def command(
 
     Takes, of what [cost] offers, the grades and options that keep the accuracy asked over the whole
     workspace, in the condition of the file and in every [case.NAME], and says what none that is
-    cheaper can cost less than. Ctrl-C gives the best design found by then (exit code 130).
+    cheaper can cost less than. Ctrl-C gives the best design found by then (exit code 130). Exit
+    code 1 where --region meets a pose at which the design does not keep them.
     """
     import truepose
     from truepose.cli import _steps
@@ -200,7 +201,10 @@ def command(
         # Beside data for programs a sentence goes where people look.
         for sentence in words.sentences(allocation):
             click.echo(sentence, err=True)
-    return INTERRUPTED if allocation.interrupted else 0
+    if allocation.interrupted:
+        return INTERRUPTED
+    proof = allocation.region_proof
+    return int(proof is not None and proof.witness is not None)
 
 
 def _page(path: Path, machine_file: Path) -> Any:

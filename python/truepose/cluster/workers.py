@@ -203,7 +203,7 @@ def connected(options: ClusterOptions) -> Iterator[Workers]:
     import dask
     import distributed  # noqa: F401  first: as it comes it completes the configuration set here
 
-    quiet = {
+    quiet: dict[str, Any] = {
         "distributed.comm.timeouts.connect": f"{ANSWER:g}s",
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],

@@ -86,7 +86,8 @@ class OneAllocation(Telling):
                 for kind in targets
             }
             region = prove_region(designed, self.task.conditions, targets, largest, self._progress)
-            proven = REGION if region.kept else proven
+            if region.kept or region.witness is not None:
+                proven = REGION if region.kept else NOT_PROVEN
         return Allocation(
             machine=self.machine,
             designed=designed,

@@ -118,9 +118,10 @@ class Allocation(Represented):
     quantity, m or rad, kept in `state` with a share `reserve` left. `proven`: "these poses" where
     the verdict proves the targets at the worst poses, the number of them `poses_proven`, "region"
     where `truepose.bounds` proves them all over the box (`region_proof` says of that, where it was
-    asked for), else "none". `worst_poses`: the worst first. `one_grade`: what it would cost with
-    all ties at the same place of their lists, `one_width` also between two grades; infinite where
-    that keeps nothing, or there is one tie. `alternatives`: other designs, the cheapest first.
+    asked for, and with a witness refutes them), else "none". `worst_poses`: the worst first.
+    `one_grade`: what it would cost with all ties at the same place of their lists, `one_width` also
+    between two grades; infinite where that keeps nothing, or there is one tie. `alternatives`:
+    other designs, the cheapest first.
     `combinations` of options, of which some are `impossible`; `rounds`: programmes solved. Of a
     design for a `share` of all machines `kept` says which share keeps the targets, at each pose
     and at all; with `all_poses` the latter was asked. Nothing of it is proven, and `lower_bound`

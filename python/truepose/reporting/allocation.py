@@ -157,6 +157,8 @@ def sentences(result: Allocation) -> Iterator[str]:
     else:
         yield f"Cost {money(result, result.cost)}; no bound is claimed for a share of all machines."
     units = result.machine.shown
+    region = result.region_proof
+    witness = None if region is None else region.witness
     for kind, target in result.targets.items():
         unit = units.error(kind)
         largest = max(
@@ -164,7 +166,8 @@ def sentences(result: Allocation) -> Iterator[str]:
         )
         size = f"{largest * unit.per_si:.4g} {unit.label}"
         yield (
-            f"The {kind} {_when(result)} is within {target * unit.per_si:.4g} {unit.label}: "
+            f"The {kind} {_when(result)} {'is' if witness is None else 'was to be'} within "
+            f"{target * unit.per_si:.4g} {unit.label}: "
             + (
                 f"the largest error found is {size}"
                 if result.share is None
@@ -183,11 +186,15 @@ def sentences(result: Allocation) -> Iterator[str]:
     saved = sum(one.price for one in result.worst_poses) / 100.0
     if saved > 0.0:
         yield f"Targets 1 % wider would save some {money(result, saved)}, between grades."
-    if result.region_proof is not None and result.proven != REGION:
-        yield f"All over the box nothing is proven: {result.region_proof.why}."
-    if result.proven == REGION:
-        assert result.region_proof is not None
-        boxes = counted(result.region_proof.boxes, "part")
+    if region is not None and witness is not None:
+        yield (
+            f"NOT kept all over the box: {region.why}. The search did not come there; a larger "
+            "--reserve leaves more room."
+        )
+    elif region is not None and result.proven != REGION:
+        yield f"All over the box nothing is proven: {region.why}."
+    if region is not None and result.proven == REGION:
+        boxes = counted(region.boxes, "part")
         yield f"Region proven: at every pose of the box, in {boxes}."
     elif result.proven == THESE_POSES:
         yield (

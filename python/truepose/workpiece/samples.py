@@ -33,10 +33,8 @@ NOTHING = 1e-12
 NUMBERS = 1 << 20
 """Coordinates that are worked on at a time."""
 
-SHARES = 32
-"""Ranges of samples at least, as far as each has as many as `FEW`: for workers to share."""
-
-FEW = 250
+SHARES, FEW = 32, 250
+"""Ranges of samples at least, for workers to share, as far as each then has so many samples."""
 
 Values = Callable[[Floats], Floats]
 """(s, n_quantity) of parts whose points are (s, n, 3)."""

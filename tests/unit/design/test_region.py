@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import truepose as tp
 from command_line import MACHINES, call
 from designs import file_with, unseen
 from sweeps import thinned
-from truepose.design.region_proof import prove_region
+from truepose.design.region_proof import RegionProof, prove_region
 from truepose.errors import RequestError
 from truepose.machine import Machine
 
@@ -99,6 +100,37 @@ def test_listed_poses_are_no_region(tmp_path: Path, capsys: Capture) -> None:
     done = call(capsys, "allocate", path, "--region")
     assert "All over the box nothing is proven: the workspace lists poses" in done.out
     assert np.isinf(found.region_proof.bound["position"])
+
+
+def test_a_design_that_is_refuted_somewhere_is_told_so(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if the targets were a little below what the search found."""
+    path = file_with(tmp_path, "planar_two_slider")
+
+    def below(
+        machine: Machine, conditions: Any, _: Any, largest: dict[str, float], *rest: Any
+    ) -> RegionProof:
+        targets = {kind: 0.97 * size for kind, size in largest.items()}
+        return prove_region(machine, conditions, targets, targets, *rest)
+
+    monkeypatch.setattr("truepose.design.one_allocation.prove_region", below)
+    found = tp.allocate(tp.load(path), region=True)
+    assert found.proven == "none"
+    assert found.region_proof is not None
+    witness = found.region_proof.witness
+    assert witness is not None
+    largest = tp.budget(found.designed, np.array([witness.pose]))["linear_maximum"]
+    assert witness.error == pytest.approx(float(largest[0].sel(quantity="position")), rel=1e-2)
+    done = call(capsys, "allocate", path, "--region")
+    assert (
+        "NOT kept all over the box: in condition a machine inside its bands has a position"
+        in done.out
+    )
+    assert done.code == 1
+    assert "was to be within" in done.out
+    assert "is within" not in done.out
+    assert "Proven at" not in done.out
 
 
 def test_only_the_worst_case_before_compensation(tmp_path: Path) -> None:

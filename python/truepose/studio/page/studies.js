@@ -6,7 +6,7 @@ const studiesTab = {
   build(host, {said, words, tell, numbers, say, ask}) {
     const store = element("select", {"aria-label": said.study}), axis = element("select", {"aria-label": said.parameter});
     const quantity = element("select", {"aria-label": said.quantity});
-    const canvas = element("canvas", {role: "img"});
+    const canvas = element("canvas", {role: "img", "aria-label": said.tabs.studies});
     const chart = element("div", {className: "live-canvas low"}, canvas), plane = canvasOf(canvas);
     const form = element("p", {className: "asked"}, element("label", {}, said.study, " ", store));
     const over = element("p", {className: "caption"}), figure = element("div", {}, over, chart,

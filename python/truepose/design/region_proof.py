@@ -70,8 +70,9 @@ def prove_region(
     largest: Mapping[str, float],
     progress: Progress | None = None,
 ) -> RegionProof:
-    """Of a design's `machine`; `largest`: errors found, by quantity, from which the gap follows.
+    """Of a design's `machine`; `largest`: errors found, by quantity.
 
+    From them it follows how close bounds have to be, and so along which freedom parts are divided.
     Before compensation. `progress` as of `truepose.bounds`.
     """
     places = JudgedPoses.of(machine)

@@ -188,8 +188,8 @@ def sentences(result: Allocation) -> Iterator[str]:
         yield f"Targets 1 % wider would save some {money(result, saved)}, between grades."
     if region is not None and witness is not None:
         yield (
-            f"NOT kept all over the box: {region.why}. The search did not come there; a larger "
-            "--reserve leaves more room."
+            f"NOT kept all over the box: {region.why}. A larger --reserve leaves more room between "
+            "the poses that are searched."
         )
     elif region is not None and result.proven != REGION:
         yield f"All over the box nothing is proven: {region.why}."

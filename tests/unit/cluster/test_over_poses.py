@@ -66,8 +66,9 @@ monte_carlo._sampled = slowly
 MORTAL = """
 import os, signal
 from truepose.error_budget import summary
+from truepose.workpiece import samples
 
-summary._summarised = lambda asked, part: os.kill(os.getpid(), signal.SIGKILL)
+summary._summarised = samples._drawn = lambda *task: os.kill(os.getpid(), signal.SIGKILL)
 """
 
 TWICE = """
@@ -115,6 +116,11 @@ def fine(tmp_path: Path) -> Path:
     return with_workspace("planar_two_slider", tmp_path, grid)
 
 
+def of(name: str, fine: Path) -> tuple[str, ...]:
+    """The words of a command of `COMMANDS`."""
+    return tuple(str(fine) if word == "FINE" else word for word in COMMANDS[name])
+
+
 def words(*of_command: str) -> list[str]:
     return [sys.executable, "-m", "truepose", *of_command, "--format", "json"]
 
@@ -149,7 +155,7 @@ def sampling(cluster: Cluster, folder: Path) -> Iterator[subprocess.Popen[str]]:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_workers_give_the_bits_of_one_process(name: str, fine: Path, cluster: Cluster) -> None:
-    command = tuple(str(fine) if word == "FINE" else word for word in COMMANDS[name])
+    command = of(name, fine)
     cluster.worker("one")
     cluster.worker("two")
     code = 1 if name in NOT_MET else 0
@@ -196,11 +202,13 @@ def test_a_worker_that_is_refused_is_named_in_python(
     assert "no work is given to worker older" in done.stdout, done.stderr
 
 
+@pytest.mark.parametrize("name", ["budget", "part"])
 def test_a_worker_that_dies_at_every_task_ends_it_with_its_name(
-    fine: Path, cluster: Cluster
+    name: str, fine: Path, cluster: Cluster
 ) -> None:
+    """So it is the worker that computes."""
     cluster.worker("mortal", MORTAL, nanny=True)
-    command = words("budget", str(fine), "--summary", "--scheduler", cluster.address)
+    command = words(*of(name, fine), "--scheduler", cluster.address)
     with started(command) as process:
         out, err = process.communicate(timeout=LIMIT)
     assert process.returncode == 2, err

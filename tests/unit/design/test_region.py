@@ -24,7 +24,7 @@ SMALL = {"planar_two_slider", "five_bar", "3rrr"}
 WITHOUT_WITNESS = {
     "3prs", "3rps", "hexapod_all_sources", "overconstrained", "tricept", "walking_6psu"
 }  # fmt: skip
-"""Machines that have a source, or closures, that is not enclosed over a region."""
+"""Machines with a source, closures or bands so wide that nothing is enclosed."""
 
 
 @pytest.mark.parametrize(

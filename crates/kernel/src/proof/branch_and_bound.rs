@@ -10,7 +10,7 @@
 //! what is reached by the gap.
 
 use super::Unproven;
-use super::over_region::{Look, middle_of};
+use super::over_region::{Look, middle_of, sides_at};
 use super::region::Region;
 use super::targets::{AS_LOW_AS_CAN_BE, TARGETS};
 use crate::batch::share_out;
@@ -247,7 +247,7 @@ pub fn bound_over_region(
 ) -> RegionBound {
     let most_boxes = search.boxes + region.most_boxes;
     let none = [f64::INFINITY; TARGETS];
-    let steps = region.steps();
+    let mut steps: Option<Vec<f64>> = None;
     if search.boxes == 0 {
         search.look_at_corners(region);
     }
@@ -296,8 +296,9 @@ pub fn bound_over_region(
         let halved =
             search.parts.len().min(BATCH.max(search.parts.len() / BATCH).min(LARGEST_BATCH));
         let rest = search.parts.split_off(halved);
+        let steps = steps.get_or_insert_with(|| region.steps());
         let halves: Vec<[Part; 2]> =
-            search.parts.iter().map(|part| part.halves(region, &steps)).collect();
+            search.parts.iter().map(|part| part.halves(region, steps)).collect();
         // The two halves of a part take as long, and are looked at by different threads.
         let (lower, upper): (Vec<Part>, Vec<Part>) =
             halves.into_iter().map(<(Part, Part)>::from).unzip();
@@ -310,8 +311,7 @@ pub fn bound_over_region(
 impl Region<'_> {
     /// A pose of the region.
     fn look_at(&self, pose: &[f64]) -> Look {
-        let spot: Vec<[f64; 2]> = pose.iter().map(|&value| [value, value]).collect();
-        self.look(&spot, &AS_LOW_AS_CAN_BE)
+        self.look(&sides_at(pose), &AS_LOW_AS_CAN_BE)
     }
 
     /// What the highest of the gaps is, of the sizes alone where these have targets.
@@ -328,13 +328,12 @@ impl Region<'_> {
     /// lie above what is reached by about the gap.
     fn steps(&self) -> Vec<f64> {
         let middle = middle_of(&self.sides);
-        let own: Vec<[f64; 2]> = middle.iter().map(|&value| [value, value]).collect();
         let looks = (0..self.sides.len()).map(|k| {
             let [low, high] = self.sides[k];
             let mut step = 1.0;
             let mut wider: Option<f64> = None;
             while high > low && step > SMALLEST {
-                let mut sides = own.clone();
+                let mut sides = sides_at(&middle);
                 let half = 0.5 * step * (high - low);
                 sides[k] = [middle[k] - half, middle[k] + half];
                 let Look { bound, mut reached, .. } = self.look(&sides, &AS_LOW_AS_CAN_BE);

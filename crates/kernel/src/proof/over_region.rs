@@ -70,7 +70,7 @@ impl Region<'_> {
         allowed: &[f64; TARGETS],
     ) -> Result<([f64; TARGETS], [f64; TARGETS]), Unproven> {
         let machine = self.machine;
-        let spot: Vec<[f64; 2]> = middle.iter().map(|&value| [value, value]).collect();
+        let spot = sides_at(middle);
         let halves: Vec<Interval> = sides
             .iter()
             .zip(middle)
@@ -231,4 +231,9 @@ fn enough_along(machine: &Machine, allowed: &[f64; TARGETS], direction: &[f64; S
 /// The middle of a box.
 pub(super) fn middle_of(sides: &[[f64; 2]]) -> Vec<f64> {
     sides.iter().map(|[low, high]| 0.5 * (low + high)).collect()
+}
+
+/// The box of one pose alone.
+pub(super) fn sides_at(pose: &[f64]) -> Vec<[f64; 2]> {
+    pose.iter().map(|&value| [value, value]).collect()
 }
